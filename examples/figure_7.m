@@ -3,7 +3,9 @@
 %   figure_7('run-1.mat', 'figure_7.svg')
 %
 % The file is that of `rheonaut export --run 1 --format mat --to run-1.mat`, or of the API's samples.mat. For Octave and
-% MATLAB.
+% MATLAB. Without a display Octave needs gnuplot:
+%
+%   octave-cli --path examples --eval "figure_7('run-1.mat', 'figure_7.svg')"
 function figure_7(mat_file, picture)
   run = load(mat_file);
   t_s = (run.robot_time_us - run.robot_time_us(1)) * 1e-6;

@@ -8,6 +8,7 @@
 #include "sim_robot/cli/play_command.hpp"
 #include "sim_robot/cli/predict_command.hpp"
 #include "sim_robot/cli/proxy_command.hpp"
+#include "sim_robot/cli/pump_command.hpp"
 #include "sim_robot/cli/replay_command.hpp"
 #include "sim_robot/cli/run_command.hpp"
 #include "sim_robot/cli/scenarios_command.hpp"
@@ -22,6 +23,7 @@ constexpr const char* kExamples = R"(Examples:
        http://127.0.0.1:7400/faults
   curl -H 'Content-Type: application/json' -d '{"fault":"reboot","cause":"brown_out","off_for_s":2}' \
        http://127.0.0.1:7400/faults                            also link_outage, clock_jump, block, …
+  rheonaut-sim pump constant --mean-flow-m-s 0.04 --faults 127.0.0.1:7400  the pump of a robot that runs
   rheonaut-sim --station 127.0.0.1:7070 --robots 1000 --duration-s 60     a fleet, and what became of its samples
   rheonaut-sim replay --station 127.0.0.1:7070 --robots 5000              the same with recorded telemetry
   rheonaut-sim scenarios                                       which there are
@@ -43,6 +45,7 @@ int main(int argc, char** argv) try {
   sim_robot::PlayCommand play{app};
   sim_robot::PredictCommand predict{app};
   sim_robot::FlowCommand flow{app};
+  sim_robot::PumpCommand pump{app};
   sim_robot::ProxyCommand proxy{app};
   try {
     app.parse(argc, argv);
@@ -51,6 +54,7 @@ int main(int argc, char** argv) try {
     if (play.chosen()) return play.run();
     if (predict.chosen()) return predict.run();
     if (flow.chosen()) return flow.run();
+    if (pump.chosen()) return pump.run();
     if (proxy.chosen()) return proxy.run();
     return run.run();
   } catch (const CLI::ParseError& error) {

@@ -99,7 +99,7 @@ void ApiServer::add_routes(boost::asio::io_context& loop, station::Station& stat
   add_experiment_routes(router_, {clock_, experiments, station});
   connect_controllers(experiments, {analysis, recording.designs, station});
   experiments.set_on_change(
-      [&live](const experiments::ExperimentView& view) { live.publish_experiment(to_json(view)); });
+      [&live](const experiments::ExperimentView& view) { live.publish_experiment(summary_json(view)); });
   add_audit_routes(router_, {clock_, history, recording.recorder});
 }
 

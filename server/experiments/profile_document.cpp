@@ -135,7 +135,8 @@ void fields(base::Fields& fields, Conditions& conditions) {
   std::string fluid = conditions.fluid.empty() ? "any" : conditions.fluid;
   fields.text("fluid", fluid, "name of the fluid; any: the one that the robot is in");
   fields.choice("pump", pump, pump_flows(), "flow in the vessel");
-  fields.number("mean_flow_m_s", conditions.mean_flow_m_s, {-1, 1}, "mean velocity of the flow; 0 if the pump is off");
+  fields.number("mean_flow_m_s", conditions.mean_flow_m_s, {-1, 1},
+                "mean velocity of the flow in the tube where a run begins; 0 if the pump is off");
   auto start = static_cast<std::size_t>(conditions.start);
   fields.choice(
       "start", start, start_positions(),

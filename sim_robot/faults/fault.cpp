@@ -45,14 +45,29 @@ Fault parse_fault_json(std::string_view json) {
   return fault;
 }
 
+namespace {
+
+void check_flow(const Fault& fault, const WorldConfig& world) {
+  const char* const name = type_of(fault.kind).name;
+  if (!world.vessel) base::throw_invalid(name, ": there is no vessel; give the world a [vessel]");
+  if (fault.kind == FaultKind::mean_flow) return;
+  if (fault.pump == PumpSetting::off && fault.mean_flow_m_s != 0) {
+    base::throw_invalid("mean_flow_m_s is ", fault.mean_flow_m_s, ", but pump is off");
+  }
+  const double most_m_s = kMostFlowM3S / tube_area_m2(world.vessel->large_diameter_m);
+  if (!(std::abs(fault.mean_flow_m_s) <= most_m_s)) {
+    base::throw_invalid("mean_flow_m_s: is ", fault.mean_flow_m_s, ", the pump reaches ", most_m_s, " in this vessel");
+  }
+}
+
+}  // namespace
+
 void check(const Fault& fault, const WorldConfig& world) {
   const FaultType& type = type_of(fault.kind);
   if (type.target == FaultTarget::accelerometer && !world.imu) {
     base::throw_invalid(type.name, ": the perfect sensor has no faults; leave out preset = \"perfect\"");
   }
-  if (fault.kind == FaultKind::mean_flow && !world.vessel) {
-    base::throw_invalid("mean_flow: there is no vessel; give the world a [vessel]");
-  }
+  if (type.target == FaultTarget::pump) check_flow(fault, world);
   if (fault.kind == FaultKind::pour_glucose) check(fault.patch);
   const bool is_clock = fault.kind == FaultKind::clock_drift || fault.kind == FaultKind::clock_jump;
   const double by = fault.kind == FaultKind::clock_drift ? fault.drift_ppm : fault.jump_s;

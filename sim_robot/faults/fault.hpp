@@ -38,6 +38,7 @@ enum class FaultKind {
   electrode_offset,
   electrode_missing,
   mean_flow,
+  pump_flow,
   pour_glucose,
   link_outage,
   link_half_open,
@@ -52,6 +53,9 @@ enum class FaultKind {
   clock_drift,
   clock_jump,
 };
+
+// As a profile of an experiment names it: docs/experiments.md, conditions.pump.
+enum class PumpSetting : std::uint8_t { off, constant, pulse_70_bpm };
 
 enum class FaultTarget { accelerometer, electrode, pump, glucose, link, delay, rate, loss, split, robot, clock };
 
@@ -71,6 +75,8 @@ struct Fault {
 
   double magnitude = kMustBeGiven;  // sensors: m/s² or mV; sd of the noise, or the offset
   double mean_flow_m3_s = kMustBeGiven;
+  PumpSetting pump = PumpSetting::off;
+  double mean_flow_m_s = 0;                        // in the tube that the robot is in when it begins
   GlucosePatch patch{.position_m = kMustBeGiven};  // poured at once; its for_s says when it is removed
 
   Direction direction = Direction::both;

@@ -24,6 +24,13 @@ void pour(const Fault& fault, World& world) {
   world.pour(patch);
 }
 
+void drive_pump(const Fault& fault, World& world) {
+  if (fault.kind == FaultKind::mean_flow) return world.set_mean_flow_m3_s(fault.mean_flow_m3_s);
+  const bool is_constant = fault.pump == PumpSetting::constant;
+  const double mean_flow_m3_s = fault.mean_flow_m_s * world.tube_area_m2();
+  world.set_flow(is_constant ? PumpKind::constant : PumpKind::pulse_70_bpm, mean_flow_m3_s);
+}
+
 // The part of an impairment that a target names; the others are not touched.
 void copy_part(FaultTarget target, const Impairment& from, Impairment& to) {
   switch (target) {
@@ -124,7 +131,7 @@ void apply(const Fault& fault, const FaultyRobot& robot) {
       return world.set_fault(Sensor::accelerometer, sensor_fault(fault, FaultKind::accelerometer_stuck));
     case FaultTarget::electrode:
       return world.set_fault(Sensor::electrode, sensor_fault(fault, FaultKind::electrode_stuck));
-    case FaultTarget::pump: return world.set_mean_flow_m3_s(fault.mean_flow_m3_s);
+    case FaultTarget::pump: return drive_pump(fault, world);
     case FaultTarget::glucose: return pour(fault, world);
     default: return upset(fault, robot.life);
   }
@@ -138,7 +145,10 @@ void end(const Fault& fault, const FaultyRobot& robot) {
   switch (target) {
     case FaultTarget::accelerometer: return world.set_fault(Sensor::accelerometer, {});
     case FaultTarget::electrode: return world.set_fault(Sensor::electrode, {});
-    case FaultTarget::pump: return world.set_mean_flow_m3_s(config.world.vessel->pump.mean_flow_m3_s);
+    case FaultTarget::pump: {
+      const PumpParameters& pump = config.world.vessel->pump;
+      return world.set_flow(pump.kind, pump.mean_flow_m3_s);
+    }
     case FaultTarget::robot: return robot.life.unblock();
     case FaultTarget::clock: return robot.life.drift(config.clock_drift_ppm);
     default: return;

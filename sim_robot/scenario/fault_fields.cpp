@@ -19,6 +19,7 @@ constexpr std::array kTypes{
     FaultType{"electrode_offset", electrode, true, "a constant on top of its readings"},
     FaultType{"electrode_missing", electrode, true, "it reads 0 mV"},
     FaultType{"mean_flow", pump, true, "another mean flow of the pump, over its ramp; then that of the beginning"},
+    FaultType{"pump_flow", pump, true, "the pump as an experiment names it, over its ramp; then as in the beginning"},
     FaultType{"pour_glucose", glucose, false, "one more patch of glucose"},
     FaultType{"link_outage", link, true, "nothing passes between robot and station"},
     FaultType{"link_half_open", link, true, "the connection stays and says nothing"},
@@ -39,6 +40,16 @@ constexpr std::array<const char*, 3> kDirections{"up", "down", "both"};
 constexpr std::array<const char*, 6> kCauses{"unknown", "power_on", "software", "watchdog", "brown_out", "external"};
 constexpr Range kDuration{0.001, kForEver};
 constexpr double kMostAcceleration_m_s2 = 160, kMostImpedanceMv = 5000;
+
+constexpr std::array<const char*, 3> kPumpSettings{"off", "constant", "pulse_70_bpm"};
+
+void pump_flow_fields(Fields& fields, Fault& fault) {
+  auto index = static_cast<std::size_t>(fault.pump);
+  fields.choice("pump", index, kPumpSettings, "constant: without pulsation");
+  fault.pump = static_cast<PumpSetting>(index);
+  fields.number("mean_flow_m_s", fault.mean_flow_m_s, {-1, 1},
+                "mean velocity in the tube that the robot is in; 0 if the pump is off");
+}
 
 void direction_field(Fields& fields, Fault& fault) {
   auto index = static_cast<std::size_t>(fault.direction);
@@ -110,6 +121,7 @@ void fields(Fields& fields, Fault& fault) {
   if (fault.kind == FaultKind::mean_flow) {
     fields.number("mean_flow_m3_s", fault.mean_flow_m3_s, kFlowRange, "negative: backwards");
   }
+  if (fault.kind == FaultKind::pump_flow) pump_flow_fields(fields, fault);
   if (fault.kind == FaultKind::pour_glucose) patch_fields(fields, fault.patch);
   magnitude_field(fields, fault);
   link_fields(fields, fault);

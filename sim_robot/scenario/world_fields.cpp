@@ -11,6 +11,7 @@ namespace {
 constexpr std::array<const char*, 4> kFluids{"non_newtonian", "water", "water_nonlinear", "shear_thinning"};
 constexpr std::array<const char*, 2> kBatteries{"steady", "cr123a"};
 constexpr std::array<const char*, 2> kAccelerometers{"bno055", "perfect"};
+constexpr std::array<const char*, 2> kPumpKinds{"pulse_70_bpm", "constant"};
 constexpr std::array<const char*, 2> kElectrodes{"perfect", "ds550"};
 
 constexpr Range kNotNegative{0, 1e9};
@@ -56,6 +57,9 @@ void battery_fields(Fields& fields, BatteryParameters& battery) {
 }
 
 void pump_fields(Fields& fields, PumpParameters& pump) {
+  auto kind = static_cast<std::size_t>(pump.kind);
+  fields.choice("kind", kind, kPumpKinds, "constant: without pulsation");
+  pump.kind = static_cast<PumpKind>(kind);
   fields.number("mean_flow_m3_s", pump.mean_flow_m3_s, kFlowRange, "negative: backwards");
   fields.number("starts_at_s", pump.starts_at_s, {-1e9, 1e9}, "time of the run; before 0 it has been on for long");
   fields.number("ramp_s", pump.ramp_s, {0, 1e6}, "of each change of the mean flow");

@@ -34,8 +34,8 @@ void check(const PumpParameters& parameters) {
   const auto refuse = [](const char* name, const char* allowed, double value) {
     base::throw_invalid("pump: ", name, " must be ", allowed, ", is ", value);
   };
-  if (!(std::abs(parameters.mean_flow_m3_s) <= 0.01)) {
-    refuse("mean_flow_m3_s", "in [-0.01, 0.01] (10 L/s)", parameters.mean_flow_m3_s);
+  if (!(std::abs(parameters.mean_flow_m3_s) <= kMostFlowM3S)) {
+    refuse("mean_flow_m3_s", "in [-0.03, 0.03] (30 L/s)", parameters.mean_flow_m3_s);
   }
   if (!std::isfinite(parameters.starts_at_s)) refuse("starts_at_s", "finite", parameters.starts_at_s);
   if (!(parameters.ramp_s >= 0 && parameters.ramp_s <= 3600)) refuse("ramp_s", "in [0, 3600]", parameters.ramp_s);
@@ -65,7 +65,8 @@ Pump::Pump(const PumpParameters& parameters)
       per_ramp_tick_(parameters.ramp_s > 0 ? kTickS / parameters.ramp_s : 2),
       decay_(std::exp(-kTickS / parameters.compliance_s)),
       late_share_(1 - parameters.compliance_s / kTickS * (1 - decay_)),
-      to_m3_s_(parameters.mean_flow_m3_s) {
+      kind_(parameters.kind),
+      to_(flow_of(parameters.kind, parameters.mean_flow_m3_s)) {
   check(parameters);
   if (parameters.starts_at_s >= 0) {
     starts_in_ticks_ = parameters.starts_at_s / kTickS;
@@ -75,16 +76,30 @@ Pump::Pump(const PumpParameters& parameters)
   // Up to time 0 as if it had always been on.
   const double settling_ticks = std::ceil(kSettledTimeConstants * parameters.compliance_s / kTickS);
   tick_ = kTableTicks - 1 - static_cast<std::size_t>(settling_ticks) % kTableTicks;
-  inflow_m3_s_ = flow_m3_s_ = to_m3_s_ * profile_[tick_];
+  inflow_m3_s_ = flow_m3_s_ = to_.pulse_m3_s * profile_[tick_] + to_.constant_m3_s;
   for (double k = 0; k <= settling_ticks; ++k) step();
 }
 
-double Pump::mean_flow_m3_s() const { return std::lerp(from_m3_s_, to_m3_s_, ramp_); }
+Pump::Flow Pump::flow_of(PumpKind kind, double mean_flow_m3_s) {
+  return kind == PumpKind::constant ? Flow{0, mean_flow_m3_s} : Flow{mean_flow_m3_s, 0};
+}
 
-void Pump::set_mean_flow_m3_s(double flow_m3_s) {
-  check(PumpParameters{.mean_flow_m3_s = flow_m3_s});
-  from_m3_s_ = mean_flow_m3_s();
-  to_m3_s_ = flow_m3_s;
+Pump::Flow Pump::driven() const {
+  return {std::lerp(from_.pulse_m3_s, to_.pulse_m3_s, ramp_), std::lerp(from_.constant_m3_s, to_.constant_m3_s, ramp_)};
+}
+
+double Pump::mean_flow_m3_s() const {
+  const Flow now = driven();
+  return now.pulse_m3_s + now.constant_m3_s;
+}
+
+void Pump::set_mean_flow_m3_s(double flow_m3_s) { set_flow(kind_, flow_m3_s); }
+
+void Pump::set_flow(PumpKind kind, double mean_flow_m3_s) {
+  check(PumpParameters{.kind = kind, .mean_flow_m3_s = mean_flow_m3_s});
+  from_ = driven();
+  to_ = flow_of(kind, mean_flow_m3_s);
+  kind_ = kind;
   ramp_ = starts_in_ticks_ = 0;
 }
 
@@ -96,7 +111,8 @@ void Pump::step() {
     ramp_ = std::min(1.0, ramp_ + per_ramp_tick_ * (1 - starts_in_ticks_));
     starts_in_ticks_ = 0;
   }
-  take_up(mean_flow_m3_s() * profile_[tick_]);  // (2)
+  const Flow now = driven();
+  take_up(now.pulse_m3_s * profile_[tick_] + now.constant_m3_s);  // (2)
 }
 
 // (3), exact for an inflow that is linear between two ticks.

@@ -20,6 +20,8 @@ void check_length(const char* name, double value_m, double least_m, double most_
 
 }  // namespace
 
+double tube_area_m2(double diameter_m) { return 1 / per_area(diameter_m); }
+
 void check(const VesselParameters& p) {
   check_length("large_diameter_m", p.large_diameter_m, 0.03, 10);
   check_length("small_diameter_m", p.small_diameter_m, 0.03, p.large_diameter_m);
@@ -57,6 +59,10 @@ double Vessel::passed_per_area(double position_m) const {
     sum += stretch.per_area_m2 * std::clamp(position_m - stretch.start_m, 0.0, stretch.length_m);
   }
   return sum;
+}
+
+double Vessel::tube_area_m2(double position_m) const {
+  return 1 / (position_m < stretches_[2].start_m ? stretches_[1] : stretches_[2]).per_area_m2;
 }
 
 double Vessel::velocity_m_s(double position_m) const {

@@ -31,15 +31,20 @@ struct VesselParameters {
 
 void check(const VesselParameters& parameters);
 
+double tube_area_m2(double diameter_m);
+
 class Vessel {
  public:
   explicit Vessel(const VesselParameters& parameters);
 
   void step() { pump_.step(); }  // one tick
   void set_mean_flow_m3_s(double flow_m3_s) { pump_.set_mean_flow_m3_s(flow_m3_s); }
+  void set_flow(PumpKind kind, double mean_flow_m3_s) { pump_.set_flow(kind, mean_flow_m3_s); }
 
   const Pump& pump() const { return pump_; }
   double velocity_m_s(double position_m) const;  // (1)
+  // Cross-section of the tube that has this place; a reservoir belongs to the tube beside it.
+  double tube_area_m2(double position_m) const;
 
   // How far the robot can go either way.
   double first_m() const { return first_m_; }

@@ -105,4 +105,9 @@ void World::set_mean_flow_m3_s(double flow_m3_s) {
   vessel_->set_mean_flow_m3_s(flow_m3_s);
 }
 
+void World::set_flow(PumpKind kind, double mean_flow_m3_s) {
+  if (!vessel_) base::throw_invalid("a mean flow of ", mean_flow_m3_s, " m3/s needs a vessel");
+  vessel_->set_flow(kind, mean_flow_m3_s);
+}
+
 }  // namespace sim_robot

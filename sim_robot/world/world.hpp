@@ -50,6 +50,7 @@ class World {
   void set_fault(Sensor sensor, const SensorFault& fault);
   // From now on, over the pump's ramp; there must be a vessel.
   void set_mean_flow_m3_s(double flow_m3_s);
+  void set_flow(PumpKind kind, double mean_flow_m3_s);  // the same with another kind
   void pour(const GlucosePatch& patch) { glucose_.pour(patch); }
 
   // The truth. Positions from where the robot booted.
@@ -63,6 +64,7 @@ class World {
   double impedance_mv() const { return glucose_.impedance_mv(position_m_); }  // at the robot
   double accelerometer_bias_m_s2() const { return imu_ ? imu_->bias_m_s2() : 0; }
   double supply_mv() const { return battery_.supply_mv(); }
+  double tube_area_m2() const { return vessel_ ? vessel_->tube_area_m2(position_m_) : 0; }  // at the robot
   const std::optional<Vessel>& vessel() const { return vessel_; }
   const Glucose& glucose() const { return glucose_; }
 

@@ -127,6 +127,48 @@ TEST_F(Timeline, TheFlowIsThatOfTheBeginningAfterwards) {
   EXPECT_NEAR(life_.robot().world().flow_m3_s(), 0, 1e-9);
 }
 
+TEST_F(Timeline, ThePumpIsSetAsAnExperimentNamesIt) {
+  FaultTimeline faults;
+  const World& world = life_.robot().world();
+  reading_mv_at(faults, 0.01);
+  faults.inject(parse_fault_json(R"({"fault":"pump_flow","pump":"constant","mean_flow_m_s":0.05})"), robot_);
+  reading_mv_at(faults, 3);
+  EXPECT_NEAR(world.flow_velocity_m_s(), 0.05, 1e-6);
+  const double before_m = world.position_m();
+  reading_mv_at(faults, 4);
+  EXPECT_NEAR(world.position_m() - before_m, 0.05, 1e-4) << "the robot is carried";
+  faults.inject(parse_fault_json(R"({"fault":"pump_flow","pump":"pulse_70_bpm","mean_flow_m_s":0.05})"), robot_);
+  reading_mv_at(faults, 6);
+  const double first_m = world.position_m();
+  reading_mv_at(faults, 12);  // 7 periods
+  EXPECT_NEAR(world.position_m() - first_m, 0.3, 1e-3);
+  EXPECT_EQ(faults.in_force().size(), 1u);
+  faults.inject(parse_fault_json(R"({"fault":"pump_flow"})"), robot_);
+  reading_mv_at(faults, 15);
+  EXPECT_NEAR(world.flow_m3_s(), 0, 1e-9) << "off";
+}
+
+TEST_F(Timeline, RefusesAFlowThatThePumpCannotDrive) {
+  const auto refused = [this](const char* json) {
+    try {
+      check(parse_fault_json(json), robot_);
+    } catch (const std::invalid_argument& error) {
+      return std::string(error.what());
+    }
+    return std::string("no error");
+  };
+  EXPECT_EQ(refused(R"({"fault":"pump_flow","mean_flow_m_s":0.1})"), "mean_flow_m_s is 0.1, but pump is off");
+  EXPECT_THAT(refused(R"({"fault":"pump_flow","pump":"constant","mean_flow_m_s":1.1})"),
+              HasSubstr("allowed is -1 to 1"));
+  EXPECT_EQ(refused(R"({"fault":"pump_flow","pump":"constant","mean_flow_m_s":-1})"), "no error");
+  WorldConfig wide;
+  wide.vessel.emplace().large_diameter_m = 0.5;
+  Fault fast = parse_fault_json(R"({"fault":"pump_flow","pump":"constant","mean_flow_m_s":1})");
+  EXPECT_THROW(check(fast, wide), std::invalid_argument);
+  wide.vessel.reset();
+  EXPECT_THROW(check(fast, wide), std::invalid_argument);
+}
+
 TEST_F(Timeline, GlucoseIsPouredAndRemoved) {
   FaultTimeline faults{{{1, {.kind = FaultKind::pour_glucose, .for_s = 2, .patch = {.position_m = 0}}}}};
   EXPECT_EQ(reading_mv_at(faults, 1), 120);

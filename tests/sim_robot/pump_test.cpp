@@ -120,6 +120,30 @@ TEST(Pump, StartsAndTurnsRoundOverItsRamp) {
   EXPECT_NEAR(mean_flow(pump), -0.0005, 1e-6);
 }
 
+TEST(Pump, AConstantFlowHasNoPulse) {
+  Pump pump{{.kind = PumpKind::constant, .mean_flow_m3_s = -0.001, .compliance_s = 0.3}};
+  for (int k = 0; k < kSevenPeriods; ++k) {
+    ASSERT_NEAR(pump.flow_m3_s(), -0.001, 1e-12) << k;
+    pump.step();
+  }
+}
+
+TEST(Pump, ChangesItsKindOverTheRampAndBackIntoThePhaseOfThePulse) {
+  Pump pump{{.mean_flow_m3_s = 0.001, .ramp_s = 1, .compliance_s = 0}};
+  pump.set_flow(PumpKind::constant, 0.002);
+  for (int k = 0; k < 50; ++k) pump.step();
+  EXPECT_NEAR(pump.mean_flow_m3_s(), 0.0015, 1e-9);
+  EXPECT_NEAR(pump.flow_m3_s(), 0.001 + 0.0005 * pump_profile(50 * kTickS), 1e-9);
+  for (int k = 0; k < 50; ++k) pump.step();
+  EXPECT_NEAR(pump.flow_m3_s(), 0.002, 1e-12);
+  pump.set_mean_flow_m3_s(0.0005);  // of the same kind
+  for (int k = 0; k < 100; ++k) pump.step();
+  EXPECT_NEAR(pump.flow_m3_s(), 0.0005, 1e-12);
+  pump.set_flow(PumpKind::pulse_70_bpm, 0.001);
+  for (int k = 0; k < 100; ++k) pump.step();
+  EXPECT_NEAR(pump.flow_m3_s(), 0.001 * pump_profile(300 * kTickS), 1e-12);
+}
+
 TEST(FlowCsv, IsOnePeriodWithTheMeanThatIsAsked) {
   std::ostringstream out;
   write_flow_csv(out, 0.001, 600);

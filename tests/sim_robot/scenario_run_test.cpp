@@ -203,17 +203,13 @@ TEST(ScenarioRun, TheSameScenarioAndBootIdGiveTheSameBytes) {
 Scenario everything_goes_wrong(std::uint64_t seed) {
   std::string text = "duration_s = 90\nseed = " + std::to_string(seed) +
                      "\n[vessel]\n[accelerometer]\npreset = \"bno055\"\n[electrode]\npreset = \"ds550\"\n";
-  const std::map<std::string, std::string> given{{"accelerometer_noisy", "sd_m_s2 = 0.1"},
-                                                 {"accelerometer_offset", "offset_m_s2 = 0.1"},
-                                                 {"electrode_noisy", "sd_mv = 5"},
-                                                 {"electrode_offset", "offset_mv = 20"},
-                                                 {"mean_flow", "mean_flow_m3_s = 0.0002"},
-                                                 {"pour_glucose", "position_m = 0.05"},
-                                                 {"link_delay", "delay_s = 0.1\njitter_s = 0.1"},
-                                                 {"link_throttle", "bytes_per_s = 6000"},
-                                                 {"link_loss", "loss_probability = 0.3"},
-                                                 {"clock_drift", "drift_ppm = 500"},
-                                                 {"clock_jump", "jump_s = 2"}};
+  const std::map<std::string, std::string> given{
+      {"accelerometer_noisy", "sd_m_s2 = 0.1"}, {"accelerometer_offset", "offset_m_s2 = 0.1"},
+      {"electrode_noisy", "sd_mv = 5"},         {"electrode_offset", "offset_mv = 20"},
+      {"mean_flow", "mean_flow_m3_s = 0.0002"}, {"pump_flow", "pump = \"constant\"\nmean_flow_m_s = 0.01"},
+      {"pour_glucose", "position_m = 0.05"},    {"link_delay", "delay_s = 0.1\njitter_s = 0.1"},
+      {"link_throttle", "bytes_per_s = 6000"},  {"link_loss", "loss_probability = 0.3"},
+      {"clock_drift", "drift_ppm = 500"},       {"clock_jump", "jump_s = 2"}};
   double at_s = 1;
   for (const FaultType& type : fault_types()) {
     text += "[[faults]]\nat_s = " + std::to_string(at_s += 3) + "\nfault = \"" + type.name + "\"\n";

@@ -38,6 +38,7 @@ preset = "water"
 junction_m = 0.5
 [vessel.pump]
 mean_flow_m3_s = 0.0004
+kind = "constant"
 [[glucose.patches]]
 position_m = 0.2
 [battery]
@@ -56,6 +57,7 @@ sag_mv = 100
   EXPECT_EQ(world.plant.model.alpha, 2);
   EXPECT_EQ(world.vessel.value().junction_m, 0.5);
   EXPECT_EQ(world.vessel.value().pump.mean_flow_m3_s, 0.0004);
+  EXPECT_EQ(world.vessel.value().pump.kind, PumpKind::constant);
   EXPECT_EQ(world.glucose.patches.at(0).position_m, 0.2);
   EXPECT_EQ(world.battery.sag_mv, 100);
   EXPECT_EQ(world.battery.idle_discharge_mv_h, kCr123a.idle_discharge_mv_h);

@@ -65,6 +65,15 @@ TEST(Vessel, MayBeginWithTheSmallTube) {
   EXPECT_NEAR(vessel.velocity_m_s(0.5) / vessel.velocity_m_s(2), kRatio, 1e-4);
 }
 
+TEST(Vessel, KnowsTheTubeOfAPlace) {
+  VesselParameters parameters;
+  const Vessel vessel{parameters};
+  for (const double in_large_m : {-0.2, 0.0, 1.39}) EXPECT_NEAR(vessel.tube_area_m2(in_large_m), area(0.16), 1e-12);
+  for (const double in_small_m : {1.41, 2.0, 3.1}) EXPECT_NEAR(vessel.tube_area_m2(in_small_m), area(0.102), 1e-12);
+  parameters.is_large_tube_first = false;
+  EXPECT_NEAR(Vessel{parameters}.tube_area_m2(0), area(0.102), 1e-12);
+}
+
 TEST(Vessel, CarriesARobotAtRestByTheMeanFlow) {
   World world{in_a_vessel(kPaperFlowM3S)};
   drift(world, 6);  // 7 periods

@@ -162,6 +162,16 @@ TEST_F(ExperimentSafetyTest, ACommandOfItsOwnOperatorEndsIt) {
   expect_aborted(id, "operator_command");
 }
 
+TEST_F(ExperimentSafetyTest, ACommandOfItsOwnThatTheRobotDropsLaterEndsIt) {
+  const auto id = start(profile({kLongSetpoint, kLater}));
+  ASSERT_TRUE(clock.run_until([&] { return view(id).progress && view(id).progress->elapsed_s > 9.75; }, 20s));
+  ASSERT_EQ(state().context.mode, rheonaut_MODE_AUTO);
+  ASSERT_TRUE(command_by("anna", sim_robot::drop_timed())) << "the disturbance waits on the robot";
+  expect_aborted(id, "command_refused");
+  EXPECT_NE(view(id).experiment.detail.find("inject_disturbance"), std::string::npos) << view(id).experiment.detail;
+  for (const auto& one : samples_of_first_run(id)) ASSERT_EQ(one.disturbance_m, 0.0F);
+}
+
 TEST_F(ExperimentSafetyTest, WhoTakesControlByForceHasTheRobotAtRestAndMayGoOn) {
   const auto id = start(profile({kLongDuty}));
   clock.run_for(1s);

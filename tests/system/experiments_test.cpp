@@ -136,6 +136,41 @@ TEST_F(ExperimentsTest, OneThatWaitsIsCancelled) {
   EXPECT_EQ(until(id, ExperimentState::cancelled).reason, "requested");
 }
 
+TEST_F(ExperimentsTest, AListCountsTheRunsAndOnlyTheOneHasThem) {
+  std::vector<storage::RunCounts> reported;
+  experiments->set_on_change([&reported](const ExperimentView& summary) {
+    EXPECT_TRUE(summary.experiment.runs.empty());
+    reported.push_back(summary.experiment.run_counts);
+  });
+  const auto id = start(profile({kRest}, "[sweep]\nrepeats = 3\n"));
+  until(id, ExperimentState::done);
+  const storage::RunCounts all_done{{ExperimentState::done, 3}};
+  EXPECT_EQ(reported.back(), all_done);
+  const storage::RunCounts one_runs{{ExperimentState::done, 2}, {ExperimentState::running, 1}};
+  EXPECT_NE(std::ranges::find(reported, one_runs), reported.end());
+  const auto listed = wait_for(experiments->list({}));
+  ASSERT_EQ(listed.size(), 1U);
+  EXPECT_TRUE(listed[0].experiment.runs.empty());
+  EXPECT_EQ(listed[0].experiment.run_counts, all_done);
+  EXPECT_EQ(view(id).experiment.runs.size(), 3U);
+  EXPECT_EQ(view(id).experiment.run_counts, all_done);
+  EXPECT_FALSE(experiments->summary(id)) << "it has ended";
+  experiments->set_on_change([](const ExperimentView&) {});
+}
+
+TEST_F(ExperimentsTest, AWholeQueueIsThereAgainAfterARestart) {
+  std::vector<storage::ExperimentId> queue;
+  for (std::size_t i = 0; i < kMostQueued; ++i) queue.push_back(enqueue(profile({kRest})));
+  begin_again();
+  clock.run_for(1s);
+  for (const storage::ExperimentId id : queue) {
+    const auto summary = experiments->summary(id);
+    ASSERT_TRUE(summary) << id;
+    EXPECT_EQ(summary->waits_for, "held");
+  }
+  EXPECT_EQ(try_to_begin(profile({kRest})).error().reason, "too_many_experiments");
+}
+
 TEST_F(ExperimentsTest, WaitsForThePersonWhoChangesTheFluid) {
   const std::string head = "[sweep]\nfluids = [\"non_newtonian\", \"water\"]\n";
   const auto id = start(profile({kRest}, head));
@@ -150,6 +185,70 @@ TEST_F(ExperimentsTest, WaitsForThePersonWhoChangesTheFluid) {
   ASSERT_TRUE(wait_for(experiments->resume(id, {"anna", "", 0})));
   const storage::Experiment ended = until(id, ExperimentState::done);
   EXPECT_EQ(wait_for(runs->find(*ended.runs.at(1).run))->conditions.fluid, "water");
+}
+
+TEST_F(ExperimentsTest, WaitsForThePersonWhoSetsThePumpAndNobodyIsAskedTwice) {
+  const std::string head = "[conditions]\npump = \"constant\"\nmean_flow_m_s = 0.04\n";
+  come("anna");
+  const auto id = enqueue(profile({kDuty}, head));
+  const storage::Experiment paused = until(id, ExperimentState::paused);
+  EXPECT_EQ(paused.reason, "pump");
+  EXPECT_NE(paused.detail.find("set the pump to 'constant, mean 0.04 m/s' and resume"), std::string::npos)
+      << paused.detail;
+  clock.run_for(30s);
+  EXPECT_EQ(view(id).experiment.state, ExperimentState::paused);
+  EXPECT_EQ(robot->simulated().motor_duty(), 0) << "SAFETY: nothing moves before somebody has confirmed the flow";
+  EXPECT_TRUE(view(id).experiment.runs.empty());
+  EXPECT_EQ(wait_for(experiments->resume(id, {"boris", "", 0})).error().reason, "acts_for_another");
+  ASSERT_TRUE(wait_for(experiments->resume(id, {"anna", "", 0})));
+  const storage::Experiment ended = until(id, ExperimentState::done);
+  const auto conditions = wait_for(runs->find(*ended.runs.at(0).run))->conditions;
+  EXPECT_EQ(conditions.pump_profile, "constant");
+  EXPECT_EQ(conditions.mean_flow_m_s, 0.04);
+  until(enqueue(profile({kRest}, head)), ExperimentState::done);
+  const auto off = enqueue(profile({kRest}));
+  EXPECT_EQ(until(off, ExperimentState::paused).reason, "pump");
+  EXPECT_NE(view(off).experiment.detail.find("'off'"), std::string::npos) << view(off).experiment.detail;
+  ASSERT_TRUE(wait_for(experiments->abort(off, "", {"boris", "", 0})));
+  expect_aborted(off, "requested");
+}
+
+boost::asio::awaitable<void> pause_it(Experiments& experiments, storage::ExperimentId id) {
+  station::Author by{"anna", "", 0};
+  co_await experiments.pause(id, std::move(by));
+}
+
+boost::asio::awaitable<void> resume_it(Experiments& experiments, storage::ExperimentId id) {
+  station::Author by{"anna", "", 0};
+  co_await experiments.resume(id, std::move(by));
+}
+
+TEST_F(ExperimentsTest, WhoResumedItBeforeItAskedForThePumpHasConfirmedNoFlow) {
+  come("anna");
+  bool is_resumed = false;
+  experiments->set_on_change([&](const ExperimentView& summary) {  // it is about to be prepared
+    if (is_resumed || summary.experiment.state != ExperimentState::running) return;
+    is_resumed = true;
+    tasks.spawn("pause", pause_it(*experiments, summary.experiment.id));
+    tasks.spawn("resume", resume_it(*experiments, summary.experiment.id));
+  });
+  const auto id = enqueue(profile({kDuty}, "[conditions]\npump = \"constant\"\nmean_flow_m_s = 0.04\n"));
+  clock.run_for(10s);
+  experiments->set_on_change([](const ExperimentView&) {});
+  ASSERT_TRUE(is_resumed);
+  EXPECT_EQ(until(id, ExperimentState::paused).reason, "pump");
+  EXPECT_TRUE(view(id).experiment.runs.empty());
+  EXPECT_EQ(robot->simulated().motor_duty(), 0);
+}
+
+TEST_F(ExperimentsTest, ThePumpMayTakeLongerThanAnotherPause) {
+  come("anna");
+  const auto id = enqueue(profile({kDuty}, "[conditions]\npump = \"pulse_70_bpm\"\nmean_flow_m_s = 0.02\n"));
+  EXPECT_EQ(until(id, ExperimentState::paused).reason, "pump");
+  clock.run_for(11min);
+  EXPECT_EQ(view(id).experiment.state, ExperimentState::paused);
+  ASSERT_TRUE(wait_for(experiments->abort(id, "", {"anna", "", 0})));
+  expect_aborted(id, "requested");
 }
 
 TEST_F(ExperimentsTest, WhatTheStationsLimitsForbidIsNotQueued) {

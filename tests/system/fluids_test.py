@@ -82,6 +82,30 @@ class FluidsTest(unittest.TestCase):
                          f"fluid    water: {limits.format(0.5)}", f"fluid    not known: {limits.format(0.5)}"):
                 self.assertIn(line, printed.splitlines())
 
+    def test_the_tool_shows_and_changes_it_and_the_audit_knows_who(self):
+        with lab() as place:
+            station = place.start_station(config=CONFIG)
+            place.start_robot(station)
+            station.wait_for_robot("sim-1")
+            tool = lambda *words: place.tool("robot", "fluid", "sim-1", *words, "--data", place.data)
+            self.assertTrue(tool().stdout.startswith("fluid  not known: the strictest limits of all fluids hold\n"))
+            self.assertIn("the robot's fluid is not known", self.refused_duty(station))
+            done = tool("--set", " OIL")
+            self.assertEqual((done.returncode, done.stderr), (0, ""))
+            self.assertRegex(done.stdout, r"^fluid  oil\nmodel  assumed")
+            self.assertEqual(self.refused_duty(station), "", "its limits hold at once")
+            self.assertEqual(json.loads(tool("--json").stdout)["fluid"], "oil")
+            done = tool("--set", "honey")
+            self.assertEqual(done.returncode, 1)
+            self.assertIn("is none of non_newtonian, oil, water", done.stderr)
+            entries = station.get("/api/v1/audit?limit=20")["entries"]
+            changes = [(one["actor"], one["subject"]) for one in entries if one["action"] == "robot.fluid_set"]
+            self.assertEqual(changes, [("token:local", "oil")])
+            self.assertEqual(self.post(station, "/api/v1/robots/sim-1/fluid", {"fluid": "water"})[0], 200)
+            self.assertEqual(tool().stdout.splitlines()[0], "fluid  water")
+            self.assertEqual(json.loads(tool("--not-known", "--json").stdout)["fluid"], None)
+            self.assertIn("the robot's fluid is not known", self.refused_duty(station))
+
     def test_a_model_is_given_by_the_tool_sent_to_the_robot_and_known_after_kill_9(self):
         model = {"model_gain_m_s": [0.1, -0.33333334, 0, 0.01], "model_time_constant_s": [0.03, 0.5, 3, 15],
                  "fit_error": 0.0021, "plant": {"kp": 0.13}}

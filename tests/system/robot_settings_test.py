@@ -1,4 +1,4 @@
-"""`rheonaut robot parameters` and `controller` with a real station and a simulated robot: each line of docs/commands.md
+"""`rheonaut robot parameters`, `controller` and `fluid` with a real station and a simulated robot: each line of docs/commands.md
 runs, and what it says is what the robot has in force."""
 import json
 import os
@@ -9,7 +9,7 @@ import unittest
 
 from processes import BIN, ROOT, lab
 
-LINE = re.compile(r"^    (rheonaut robot (?:parameters|controller) .*?)(?:\s+# exit status (\d+))?$", re.M)
+LINE = re.compile(r"^    (rheonaut robot (?:parameters|controller|fluid) .*?)(?:\s+# exit status (\d+))?$", re.M)
 
 
 class RobotSettingsTest(unittest.TestCase):
@@ -36,7 +36,7 @@ class RobotSettingsTest(unittest.TestCase):
             kept = self.run_line(f"rheonaut design save c.json --kind controller --name c{number} --data lab")
             self.assertEqual(kept.returncode, 0, kept.stderr)
         lines = LINE.findall((ROOT / "docs/commands.md").read_text(encoding="utf-8"))
-        self.assertGreaterEqual(len(lines), 7)
+        self.assertGreaterEqual(len(lines), 13)
         for line, status in lines:
             with self.subTest(line=line):
                 done = self.run_line(line)

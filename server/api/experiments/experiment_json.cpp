@@ -57,7 +57,7 @@ Result<std::string> read_profile(const Members& body) {
 
 }  // namespace
 
-json to_json(const experiments::ExperimentView& view) {
+json summary_json(const experiments::ExperimentView& view) {
   const storage::Experiment& experiment = view.experiment;
   json out;
   out["experiment_id"] = experiment.id;
@@ -79,9 +79,16 @@ json to_json(const experiments::ExperimentView& view) {
   out["created_at_us"] = experiment.created_at_us;
   out["started_at_us"] = time_or_null(experiment.started_at_us);
   out["ended_at_us"] = time_or_null(experiment.ended_at_us);
-  out["runs"] = json::array();
-  for (const storage::ExperimentRun& run : experiment.runs) out["runs"].push_back(run_json(run));
+  out["run_counts"] = json::object();
+  for (const auto& [state, count] : experiment.run_counts) out["run_counts"][text(state)] = count;
   out["progress"] = view.progress ? progress_json(*view.progress) : json(nullptr);
+  return out;
+}
+
+json to_json(const experiments::ExperimentView& view) {
+  json out = summary_json(view);
+  out["runs"] = json::array();
+  for (const storage::ExperimentRun& run : view.experiment.runs) out["runs"].push_back(run_json(run));
   return out;
 }
 

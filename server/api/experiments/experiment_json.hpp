@@ -8,7 +8,9 @@
 
 namespace server::api {
 
-nlohmann::json to_json(const experiments::ExperimentView& view);
+// With the counts of its runs: of lists, of the answer to keep-alive, and on /live.
+nlohmann::json summary_json(const experiments::ExperimentView& view);
+nlohmann::json to_json(const experiments::ExperimentView& view);  // the same with its runs
 
 // e.g. {"robot_id":"sim-1","profile":"figure_7"}; a profile is the name of a shipped one, a document in TOML, or one as
 // a JSON object. not_found for a name that is none.

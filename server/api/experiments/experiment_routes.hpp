@@ -22,7 +22,7 @@ struct ExperimentRoutes {
 };
 void add_experiment_routes(http::Router& router, ExperimentRoutes parts);
 
-// Tells the experiments which controllers the names in their profiles mean: the newest kept one of that name.
+// Gives the experiments the controllers of the names in their profiles: the newest kept one of a name.
 struct ControllerNames {
   analysis::AnalysisService& analysis;
   storage::Designs& designs;

@@ -71,7 +71,7 @@ http::Answer list_experiments(ExperimentRoutes parts, http::Request request) {
   }
   json list = json::array();
   const auto views = co_await parts.experiments.list(std::move(filter));
-  for (const experiments::ExperimentView& view : views) list.push_back(to_json(view));
+  for (const experiments::ExperimentView& view : views) list.push_back(summary_json(view));
   co_return http::json_response(200, {{"experiments", std::move(list)}});
 }
 
@@ -104,14 +104,14 @@ http::Answer get_prediction(ExperimentRoutes parts, http::Request request) {
 http::Answer keep_alive(ExperimentRoutes parts, http::Request request) {
   const auto id = experiment_id_of(request);
   if (!id) co_return http::problem(id.error());
-  const auto actor = parts.experiments.actor_of(*id);
-  if (!actor || *actor != request.actor) {
-    co_return http::problem(409, actor ? fmt::format("it acts in the name of {}", *actor) : "it has ended",
-                            actor ? "acts_for_another" : "wrong_state");
+  const auto view = parts.experiments.summary(*id);
+  if (!view) co_return http::problem(409, "it has ended", "wrong_state");
+  const std::string& actor = view->experiment.acts_for;
+  if (actor != request.actor) {
+    co_return http::problem(409, fmt::format("it acts in the name of {}", actor), "acts_for_another");
   }
   note_sign_of_life(parts, request);
-  const auto view = co_await parts.experiments.find(*id);
-  co_return view_response(200, view);
+  co_return http::json_response(200, summary_json(*view));
 }
 
 http::Answer pause_experiment(ExperimentRoutes parts, http::Request request) {

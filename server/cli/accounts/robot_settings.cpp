@@ -189,26 +189,67 @@ int restore_controller(const Robot& robot, const RobotSettingsCommand& options, 
   return print_outcome(robot.command(body), "the controller before", options.json, out);
 }
 
+std::string model_words(const json& model) {
+  const auto reason = model.at("reason").get<std::string>();
+  const auto state = model.at("state").get<std::string>();
+  const json& error = model.at("fit_error");
+  if (!error.is_null()) return fmt::format("{}, fit error {:.2g} %", state, 100 * error.get<double>());
+  return reason.empty() ? state : fmt::format("{}: {}", state, reason);
+}
+
+// Of the robot's document, or of what the station answers to a change: both have the two members.
+int print_fluid(const json& known, bool as_json, std::ostream& out) {
+  const json& fluid = known.at("fluid");
+  if (as_json) {
+    fmt::print(out, "{}\n", json{{"fluid", fluid}, {"model", known.at("model")}}.dump(2));
+    return 0;
+  }
+  fmt::print(out, "fluid  {}\nmodel  {}\n",
+             fluid.is_null() ? "not known: the strictest limits of all fluids hold" : fluid.get<std::string>(),
+             model_words(known.at("model")));
+  return 0;
+}
+
+// The limits of commands to the robot change with it, before the station answers.
+int set_fluid(const Robot& robot, const RobotSettingsCommand& options, std::ostream& out) {
+  const json fluid = options.is_not_known ? json(nullptr) : json(options.set);
+  return print_fluid(robot.post("/fluid", {{"fluid", fluid}}), options.json, out);
+}
+
 CLI::App* offer(CLI::App& robot, RobotSettingsCommand& options, Of of, const char* name, const char* purpose) {
   CLI::App* sub = robot.add_subcommand(name, purpose);
   sub->add_option("robot_id", options.robot_id, "The robot")->required();
   sub->add_option("--data", options.data_dir, "Folder of the station (default: rheonaut-data)")->check(named());
-  sub->add_flag("--confirm", options.confirm, "Of a change that bounds motion otherwise: it is meant");
   sub->add_flag("--json", options.json, "As JSON");
   sub->callback([&options, of] { options.of = of; });
   return sub;
+}
+
+void offer_confirm(CLI::App& of, RobotSettingsCommand& options) {
+  of.add_flag("--confirm", options.confirm, "Of a change that bounds motion otherwise: it is meant");
+}
+
+void offer_fluid(CLI::App& robot, RobotSettingsCommand& options) {
+  CLI::App* fluid = offer(robot, options, Of::fluid, "fluid", "Show which fluid a robot is in, or say that it changed");
+  CLI::Option* set =
+      fluid->add_option("--set", options.set, "It is in this one, as `rheonaut fluid list` names it")->check(named());
+  fluid->add_flag("--not-known", options.is_not_known, "Nobody knows its fluid: the strictest limits of all hold")
+      ->excludes(set);
+  fluid->footer("Example: rheonaut robot fluid sim-1 --set water --data lab");
 }
 
 }  // namespace
 
 void add_options(CLI::App& robot, RobotSettingsCommand& options) {
   CLI::App* parameters = offer(robot, options, Of::parameters, "parameters", "List a robot's parameters, or set one");
+  offer_confirm(*parameters, options);
   CLI::Option* set =
       parameters->add_option("--set", options.set, "NAME=VALUE: set this one and wait until it is verified");
   parameters->add_flag("--read", options.read_anew, "Ask the robot for all of them again, then list them")
       ->excludes(set);
   parameters->footer("Example: rheonaut robot parameters sim-1 --set duty_slew_per_s=5 --data lab");
   CLI::App* controller = offer(robot, options, Of::controller, "controller", "Show a robot's controller, or set one");
+  offer_confirm(*controller, options);
   CLI::Option* file = controller->add_option(
       "--set", options.set, "What discretise --json printed, or a controller as of tune, which is discretised first");
   CLI::Option* design =
@@ -225,6 +266,7 @@ void add_options(CLI::App& robot, RobotSettingsCommand& options) {
   controller->add_option("--derivative-on", options.derivative_on, "error or measurement (default: as in force)")
       ->check(CLI::IsMember({"error", "measurement"}));
   controller->footer("Example: rheonaut robot controller sim-1 --set c.json --data lab");
+  offer_fluid(robot, options);
 }
 
 int run(const RobotSettingsCommand& options, std::ostream& out) {
@@ -232,6 +274,10 @@ int run(const RobotSettingsCommand& options, std::ostream& out) {
   if (options.of == Of::parameters) {
     if (!options.set.empty()) return set_parameter(robot, options, out);
     return options.read_anew ? read_parameters(robot, options, out) : list_parameters(robot, options.json, out);
+  }
+  if (options.of == Of::fluid) {
+    const bool is_change = options.is_not_known || !options.set.empty();
+    return is_change ? set_fluid(robot, options, out) : print_fluid(robot.get(""), options.json, out);
   }
   if (options.restore) return restore_controller(robot, options, out);
   if (options.design) return push_design(robot, options, out);

@@ -109,7 +109,8 @@ void write_json(std::ostream& out, const Profile& profile, const std::vector<Pre
                         {"position_sd_m", is_known ? OrderedJson(chosen.position_sd_m) : OrderedJson(nullptr)},
                         {"velocity_m_s", preview.velocity_m_s},
                         {"duty", preview.duty},
-                        {"setpoint_m", std::move(setpoint_m)}});
+                        {"setpoint_m", std::move(setpoint_m)},
+                        {"ignores_flow", profile.conditions.pump != experiments::PumpFlow::off}});
 }
 
 void write_table(std::ostream& out, const Profile& profile, const std::vector<Predicted>& runs) {
@@ -136,6 +137,10 @@ void write_table(std::ostream& out, const Profile& profile, const std::vector<Pr
   for (std::size_t i = 0; i < runs.size(); ++i) {
     for (const std::string& problem : runs[i].preview.problems) fmt::print(out, "run {}: {}\n", i + 1, problem);
   }
+  if (profile.conditions.pump == experiments::PumpFlow::off) return;
+  fmt::print(out, "The prediction is without the flow of the pump ({}, mean {} m/s).\n",
+             experiments::pump_flows()[static_cast<std::size_t>(profile.conditions.pump)],
+             profile.conditions.mean_flow_m_s);
 }
 
 int list(const ProfileQuestion& options, std::ostream& out) {

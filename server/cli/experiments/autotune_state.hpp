@@ -25,8 +25,8 @@ class AutotuneState {
   std::optional<std::int64_t> number(const std::string& stage, const char* name) const;
 
   void note(const std::string& stage, const char* name, const nlohmann::json& value);  // and writes the file
-  void finish(const std::string& stage, nlohmann::json what);                          // likewise
-  void forget(const std::string& stage);                                               // likewise
+  void finish(const std::string& stage, nlohmann::json what);                          // the same
+  void forget(const std::string& stage);                                               // the same
 
   const nlohmann::json& document() const { return document_; }
 

@@ -134,14 +134,15 @@ json watch(const StationClient& station, std::int64_t id) {
   const std::string one = fmt::format("{}/{}", kExperiments, id);
   bool is_interrupted = false;
   for (;;) {
-    // A sign of life. Refused when it has ended, or when somebody has taken it over: then it is theirs.
+    // A sign of life, answered without the runs. Refused when it has ended, or when somebody has taken it over: then it
+    // is theirs.
     const StationAnswer kept = is_interrupted ? StationAnswer{} : station.ask("POST", one + "/keep-alive");
     const bool is_ours = kept.status == 200;
     json experiment = is_ours ? kept.body : ask_experiments(station, "GET", one);
     progress.show(experiment);
     if (is_over(experiment)) {
       progress.end();
-      return experiment;
+      return is_ours ? ask_experiments(station, "GET", one) : experiment;  // with its runs
     }
     if (!interrupt.comes_within_ms(kWatch_ms)) continue;
     if (is_interrupted || !is_ours) throw std::runtime_error{"interrupted; the experiment is still there"};
@@ -196,11 +197,13 @@ int list_experiments(const ExperimentCommand& options, std::ostream& out) {
   }
   Table table{{"id", "<state", "<robot", "<name", "runs", "<begun", "<by", "<why"}};
   for (const json& one : experiments) {
+    int begun = 0;
+    for (const json& count : one.at("run_counts")) begun += count.get<int>();
     const std::string why = text_of(one.at(one.at("state") == "waiting" ? "waits_for" : "reason"));
     table.row({std::to_string(one.at("experiment_id").get<std::int64_t>()), one.at("state"), one.at("robot_id"),
                one_line(one.at("name").get<std::string>()),
-               fmt::format("{} of {}", one.at("runs").size(), one.at("runs_planned").get<int>()),
-               time_text(one.at("created_at_us")), one.at("owner"), why});
+               fmt::format("{} of {}", begun, one.at("runs_planned").get<int>()), time_text(one.at("created_at_us")),
+               one.at("owner"), why});
   }
   table.write(out);
   return 0;

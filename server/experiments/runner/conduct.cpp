@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "server/analysis/control_json.hpp"
+#include "server/experiments/runner/pump_flow.hpp"
 #include "server/storage/experiments/experiment_store.hpp"
 
 namespace server::experiments {
@@ -94,6 +95,7 @@ asio::awaitable<void> Conduct::prepare(Variant variant) {
   co_await await_actor();
   if (!abort_) take_control();
   if (!abort_) co_await await_fluid(variant.fluid);
+  if (!abort_ && number_ == 1) co_await await_flow();  // one flow for the whole grid
   if (!abort_ && !variant.controller.empty()) co_await send_controller(variant.controller);
   if (!abort_) co_await await_model();
   if (!abort_) co_await go_to_start();
@@ -116,8 +118,8 @@ asio::awaitable<void> Conduct::await_actor() {
 }
 
 // Paused by somebody while no driver is at work, or until the fluid is another one.
-asio::awaitable<void> Conduct::await_resumption() {
-  const std::int64_t ends_us = parts_.driver.clock.steady_us() + kLongestPause.count();
+asio::awaitable<void> Conduct::await_resumption(microseconds limit) {
+  const std::int64_t ends_us = parts_.driver.clock.steady_us() + limit.count();
   const bool was_paused = waiting_for_.has_value();
   while (!abort_ && waiting_for_ && !is_resumed_) {
     if (parts_.driver.clock.steady_us() > ends_us) abort({"paused_too_long", "nobody resumed it"});
@@ -165,6 +167,17 @@ asio::awaitable<void> Conduct::await_fluid(std::string fluid) {
   if (abort_ || !waiting_for_) co_return;
   co_await await_resumption();
   boot_id_ = robot().boot_id;  // it may have been switched off meanwhile
+  if (!abort_) take_control();
+}
+
+// SAFETY: the station sets no pump, so nothing moves in a flow that nobody has confirmed; who resumes it confirms it.
+asio::awaitable<void> Conduct::await_flow() {
+  const auto last = co_await parts_.runs.last_flow(experiment_.request.robot_id);
+  auto to_set = flow_to_set(profile_.conditions, last);
+  if (abort_ || !to_set) co_return;
+  is_resumed_ = false;
+  waiting_for_ = Abort{"pump", std::move(*to_set)};
+  co_await await_resumption(kFluidWithin);
   if (!abort_) take_control();
 }
 

@@ -1,10 +1,10 @@
 // Conducts one experiment: prepares each run of its grid, records it, drives it, and says how it ended.
 //
-//   for each run: fluid → controller → model on the robot → beginning of the run → time line → end of the run
+//   for each run: fluid, flow → controller → model on the robot → beginning of the run → time line → end of the run
 //
 // Each run and its prediction is on disk before the robot moves. What cannot be prepared is a reason to pause (a person
-// must change the fluid) or to abort. Loop thread; all that it is given outlives it, and it outlives the loop's run()
-// or its own run().
+// must change the fluid, or set the pump) or to abort. Loop thread; all that it is given outlives it, and it outlives
+// the loop's run() or its own run().
 #pragma once
 
 #include <boost/asio/awaitable.hpp>
@@ -23,7 +23,7 @@
 
 namespace server::experiments {
 
-inline constexpr microseconds kFluidWithin{3'600'000'000};  // for a person to change it
+inline constexpr microseconds kFluidWithin{3'600'000'000};  // for a person to change it, or to set the pump
 
 // The controller of a name that a profile mentions, for this robot. Errors say what is wrong with the name.
 using ControllerByName =
@@ -66,8 +66,9 @@ class Conduct {
   boost::asio::awaitable<void> one_run(Variant variant);
   boost::asio::awaitable<void> prepare(Variant variant);
   boost::asio::awaitable<void> await_fluid(std::string fluid);
+  boost::asio::awaitable<void> await_flow();
   boost::asio::awaitable<void> await_actor();
-  boost::asio::awaitable<void> await_resumption();
+  boost::asio::awaitable<void> await_resumption(microseconds limit = kLongestPause);
   boost::asio::awaitable<void> await_model();
   boost::asio::awaitable<void> send_controller(std::string name);
   boost::asio::awaitable<void> go_to_start();

@@ -108,7 +108,7 @@ asio::awaitable<Result<ExperimentView>> Experiments::begin(storage::ExperimentRe
   const ExperimentId id = experiment.id;
   Entry& kept = entries_[id];
   kept = std::move(entry);
-  const Waits waits = waits_for(kept);
+  const WaitReason waits = wait_reason_of(kept);
   kept.waits_for = waits.reason;
   kept.waits_for_detail = waits.detail;
   publish(kept);
@@ -130,7 +130,7 @@ asio::awaitable<std::vector<ExperimentView>> Experiments::list(storage::Experime
   std::vector<ExperimentView> views;
   for (Experiment& experiment : found) {
     const auto known = entries_.find(experiment.id);
-    views.push_back(known != entries_.end() ? view_of(known->second)
+    views.push_back(known != entries_.end() ? summary_of(known->second)
                                             : ExperimentView{std::move(experiment), "", "", std::nullopt});
   }
   co_return views;
@@ -165,9 +165,9 @@ Result<Experiments::Entry*> Experiments::entry_of(ExperimentId id) {
   return &found->second;
 }
 
-std::optional<std::string> Experiments::actor_of(ExperimentId id) const {
+std::optional<ExperimentView> Experiments::summary(ExperimentId id) const {
   const auto found = entries_.find(id);
-  return found == entries_.end() ? std::nullopt : std::optional{found->second.experiment.acts_for};
+  return found == entries_.end() ? std::nullopt : std::optional{summary_of(found->second)};
 }
 
 station::AuditNote Experiments::note_of(const Entry& entry, const char* what, const station::Author& by) const {

@@ -2,13 +2,11 @@
 #include "server/experiments/runner/experiments.hpp"
 
 #include <fmt/format.h>
-#include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <array>
 #include <string_view>
 
-#include "server/experiments/profile_document.hpp"
 #include "server/experiments/runner/limits_check.hpp"
 #include "server/storage/experiments/experiment_store.hpp"
 
@@ -24,22 +22,10 @@ namespace {
 constexpr microseconds kLookAtQueues = 200ms;
 constexpr microseconds kPublishEvery = 1s;
 constexpr microseconds kUnusedFor = 3s;  // by people, before an experiment begins by itself
-constexpr microseconds kAgainAfter = 1s;
-constexpr const char* kStationActor = "station:experiments";
 
 // What keeps one experiment from its beginning and no other one behind it.
 constexpr std::array<std::string_view, 5> kLetsOthersGo{"held", "nobody_present", "control_of_another", "unreadable",
                                                         "unattended_not_allowed"};
-
-// The document was checked before it was stored.
-std::optional<Profile> profile_of(const Experiment& experiment) {
-  try {
-    return parse_profile(experiment.request.profile, experiment.request.name);
-  } catch (const std::invalid_argument& error) {
-    spdlog::error("experiment {} cannot be read any more: {}", experiment.id, error.what());
-    return std::nullopt;
-  }
-}
 
 bool comes_before(const Experiment& a, const Experiment& b) {
   if (a.request.priority != b.request.priority) return a.request.priority > b.request.priority;
@@ -61,36 +47,6 @@ Experiments::Experiments(const DriverParts& parts, storage::RecordingParts& reco
 }
 
 Experiments::~Experiments() = default;
-
-// What an earlier start of the station has left; tried again while the disk cannot be written.
-asio::awaitable<void> Experiments::load() {
-  struct Left {
-    std::vector<station::RobotId> to_rest;
-    std::vector<Experiment> waiting;
-  };
-  std::optional<Left> left;
-  while (!left) {
-    auto read = [utc_us = parts_.clock.utc_us()](storage::Database& database) -> std::optional<Left> {
-      try {
-        auto robots = storage::interrupt_experiments(database, utc_us);
-        return Left{std::move(robots), storage::waiting_experiments(database.handle())};
-      } catch (const SQLite::Exception& error) {
-        spdlog::error("the experiments cannot be read: {}; it is tried again", error.what());
-        return std::nullopt;
-      }
-    };
-    left = co_await recording_.recorder.on_disk(std::move(read));
-    if (!left) co_await parts_.clock.sleep_for(kAgainAfter);
-  }
-  to_rest_ = {left->to_rest.begin(), left->to_rest.end()};
-  for (Experiment& experiment : left->waiting) {
-    Entry& entry = entries_[experiment.id];
-    entry.experiment = std::move(experiment);
-    auto profile = profile_of(entry.experiment);
-    if (profile) entry.profile = std::move(*profile);
-    entry.is_unreadable = !profile;
-  }
-}
 
 asio::awaitable<void> Experiments::run() {
   co_await load();
@@ -115,34 +71,6 @@ void Experiments::spawn(const std::string& name, asio::awaitable<void> task) {
                                               std::move(task)));
 }
 
-// SAFETY: the robot of an experiment that a restart interrupted goes on in auto, if its link held; nobody watches it.
-// It stays on the list, also over further restarts, until it was seen at rest, or somebody else controls it.
-void Experiments::put_interrupted_to_rest() {
-  const std::set<station::RobotId> robots = to_rest_;  // a task may begin, and end, at once
-  for (const station::RobotId& id : robots) {
-    const station::RobotState* robot = parts_.station.find(id);
-    const bool is_known = robot != nullptr && robot->link == station::LinkState::connected && robot->sample;
-    if (is_known && resting_.insert(id).second) spawn("rest of robot '" + id + "'", settle_rest(id));
-  }
-}
-
-asio::awaitable<void> Experiments::settle_rest(station::RobotId robot_id) {
-  struct Resting {
-    std::set<station::RobotId>& robots;
-    station::RobotId id;
-    ~Resting() { robots.erase(id); }
-  };
-  const Resting one{resting_, robot_id};
-  const station::RobotState* robot = parts_.station.find(robot_id);
-  if (!robot->latched() && !is_at_rest(*robot)) {
-    RestRequest request{robot_id, kStationActor, "experiment:interrupted"};
-    co_await bring_to_rest(parts_.station, parts_.clock, std::move(request));
-  }
-  to_rest_.erase(robot_id);
-  auto seen = [robot_id](storage::Database& database) { storage::note_rest(database, robot_id); };
-  co_await writer_.keep("the rest of a robot", std::move(seen));
-}
-
 // --- what may begin ---
 
 std::vector<Experiments::Entry*> Experiments::queue_of(const station::RobotId& robot_id) {
@@ -155,7 +83,7 @@ std::vector<Experiments::Entry*> Experiments::queue_of(const station::RobotId& r
   return queue;
 }
 
-Experiments::Waits Experiments::waits_for(const Entry& entry) const {
+Experiments::WaitReason Experiments::wait_reason_of(const Entry& entry) const {
   const Experiment& experiment = entry.experiment;
   const station::RobotState* robot = parts_.station.find(experiment.request.robot_id);
   if (experiment.is_held) return {"held", "it waits until somebody resumes it: " + experiment.reason};
@@ -197,7 +125,7 @@ void Experiments::begin_what_may() {
   for (const station::RobotId& robot_id : robots) {
     bool is_turn = true;
     for (Entry* entry : queue_of(robot_id)) {
-      Waits waits = waits_for(*entry);
+      WaitReason waits = wait_reason_of(*entry);
       const bool lets_others_go = std::ranges::find(kLetsOthersGo, waits.reason) != kLetsOthersGo.end();
       if (!is_turn && !lets_others_go) waits = {"others", "others are before it"};
       is_turn = is_turn && lets_others_go;
@@ -336,14 +264,20 @@ asio::awaitable<void> Experiments::store_states(std::vector<Experiment> changed)
 
 void Experiments::publish(const Entry& entry) {
   changed_.notify();
-  on_change_(view_of(entry));
+  on_change_(summary_of(entry));
 }
 
 ExperimentView Experiments::view_of(const Entry& entry) const {
+  ExperimentView view = summary_of(entry);
+  if (entry.conduct) view.experiment.runs = entry.conduct->runs();
+  return view;
+}
+
+ExperimentView Experiments::summary_of(const Entry& entry) const {
   ExperimentView view{entry.experiment, entry.waits_for, entry.waits_for_detail, std::nullopt};
   view.experiment.state = state_of(entry);
   if (!entry.conduct) return view;
-  view.experiment.runs = entry.conduct->runs();
+  view.experiment.run_counts = storage::counts_of(entry.conduct->runs());
   if (const Abort* why = entry.conduct->pause_reason()) {
     view.experiment.reason = why->reason;
     view.experiment.detail = why->detail;

@@ -32,7 +32,7 @@ struct ExperimentProgress {
   double elapsed_s = 0, duration_s = 0;  // of the run
 };
 
-// What is known of one now.
+// What is known of one now. A summary has the counts of its runs, and no run.
 struct ExperimentView {
   storage::Experiment experiment;
   std::string waits_for;  // of a waiting one, for programs: nobody_present, robot_not_at_rest, …; empty: its turn
@@ -42,13 +42,13 @@ struct ExperimentView {
 
 class Experiments final : public station::StationSink {
  public:
-  // It hears the station from now on.
+  // It receives the reports of the station from now on.
   Experiments(const DriverParts& parts, storage::RecordingParts& recording, runtime::WorkerThread& maths,
               bool allow_unattended);
   ~Experiments() override;
 
   void set_controller_by_name(ControllerByName by_name) { controller_by_name_ = std::move(by_name); }
-  using OnChange = std::function<void(const ExperimentView&)>;
+  using OnChange = std::function<void(const ExperimentView& summary)>;
   void set_on_change(OnChange on_change) { on_change_ = std::move(on_change); }  // and once a second while one runs
 
   boost::asio::awaitable<void> run();  // until cancelled; before it nothing is begun
@@ -58,7 +58,7 @@ class Experiments final : public station::StationSink {
   boost::asio::awaitable<Result<ExperimentView>> begin(storage::ExperimentRequest request, station::Author by);
 
   boost::asio::awaitable<Result<ExperimentView>> find(storage::ExperimentId id);
-  boost::asio::awaitable<std::vector<ExperimentView>> list(storage::ExperimentFilter filter);
+  boost::asio::awaitable<std::vector<ExperimentView>> list(storage::ExperimentFilter filter);  // summaries
   boost::asio::awaitable<std::optional<std::string>> prediction(storage::ExperimentId id, std::uint32_t number);
   // As find(), once its state is another one than `known`, or so much later.
   boost::asio::awaitable<Result<ExperimentView>> wait_for_change(storage::ExperimentId id, microseconds patience);
@@ -73,8 +73,8 @@ class Experiments final : public station::StationSink {
   // Before another one of its robot's queue (0: to its end), with this priority.
   boost::asio::awaitable<Result<ExperimentView>> move(storage::ExperimentId id, storage::ExperimentId before,
                                                       std::int64_t priority, station::Author by);
-  // In whose name it acts; none: it is not known, or has ended.
-  std::optional<std::string> actor_of(storage::ExperimentId id) const;
+  // Without its runs; none: it is not known, or has ended.
+  std::optional<ExperimentView> summary(storage::ExperimentId id) const;
 
   void on_samples(const station::RobotState& robot, const station::SampleBatch& batch) override;
   void on_robot(const station::RobotState& robot) override;
@@ -92,7 +92,8 @@ class Experiments final : public station::StationSink {
     bool is_changed = false;     // and the database does not know it yet
   };
 
-  struct Waits {
+  // Why one does not begin yet: for programs, and in words; empty: it is its turn.
+  struct WaitReason {
     std::string reason, detail;
   };
 
@@ -107,6 +108,7 @@ class Experiments final : public station::StationSink {
                                   const std::string& fluid);
 
   boost::asio::awaitable<void> load();
+  boost::asio::awaitable<void> admit(storage::Experiment waiting);  // that an earlier start has left
   boost::asio::awaitable<void> carry_out(storage::ExperimentId id);
   boost::asio::awaitable<void> conduct(Entry& entry);
   boost::asio::awaitable<void> finish(Entry& entry);
@@ -118,12 +120,12 @@ class Experiments final : public station::StationSink {
   void spawn(const std::string& name, boost::asio::awaitable<void> task);
   void begin_what_may();
   void put_interrupted_to_rest();
-  Waits waits_for(const Entry& entry) const;
-  Entry* first_waiting(const station::RobotId& robot_id);
+  WaitReason wait_reason_of(const Entry& entry) const;
   std::vector<Entry*> queue_of(const station::RobotId& robot_id);
   Result<Entry*> entry_of(storage::ExperimentId id);
   Result<void> check_request(const storage::ExperimentRequest& request) const;
   storage::ExperimentState state_of(const Entry& entry) const;
+  ExperimentView summary_of(const Entry& entry) const;
   ExperimentView view_of(const Entry& entry) const;
   station::AuditNote note_of(const Entry& entry, const char* what, const station::Author& by) const;
   boost::asio::awaitable<Result<ExperimentView>> stored(storage::ExperimentId id, station::AuditNote note);

@@ -58,6 +58,7 @@ std::string prediction_json(const PredictionRequest& request) {
   out["position_max_m"] = preview.position_max_m;
   out["travel_m"] = preview.travel_m;
   out["problems"] = preview.problems;
+  out["ignores_flow"] = request.profile.conditions.pump != PumpFlow::off;
   return out.dump();
 }
 

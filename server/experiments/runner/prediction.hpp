@@ -1,7 +1,8 @@
 // What a model predicts for one run of an experiment, as JSON: stored with the run before it begins.
 //
 //   {"model": {kp, b1, …}, "model_of": "non_newtonian", "t_s": […], "position_m": […], "position_sd_m": […] or null,
-//    "velocity_m_s": […], "duty": […], "setpoint_m": […], "position_min_m", …, "problems": […]}
+//    "velocity_m_s": […], "duty": […], "setpoint_m": […], "position_min_m", …, "problems": […],
+//    "ignores_flow": true where the pump is on}
 //
 // The model is that of the fluid, or, where the fluid has none, the paper's: `model_of` says which. Pure.
 // Errors: std::invalid_argument quoting the bad value.

@@ -1,4 +1,4 @@
-// The texts of the states.
+// The texts of the states, and counts of them.
 #include "server/storage/experiments/experiment.hpp"
 
 #include <array>
@@ -31,6 +31,12 @@ std::optional<ExperimentState> experiment_state_from(const std::string& given) {
     if (given == text(state)) return state;
   }
   return std::nullopt;
+}
+
+RunCounts counts_of(const std::vector<ExperimentRun>& runs) {
+  RunCounts counts;
+  for (const ExperimentRun& run : runs) ++counts[run.state];
+  return counts;
 }
 
 }  // namespace server::storage

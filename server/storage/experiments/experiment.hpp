@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -49,6 +50,10 @@ struct ExperimentRun {
   bool has_prediction = false;
 };
 
+// Runs of an experiment that have begun, by their state.
+using RunCounts = std::map<ExperimentState, std::uint32_t>;
+RunCounts counts_of(const std::vector<ExperimentRun>& runs);
+
 struct Experiment {
   ExperimentId id = 0;
   ExperimentState state = ExperimentState::waiting;
@@ -64,7 +69,8 @@ struct Experiment {
   double duration_s = 0;  // of all runs, without what is between them
   std::int64_t created_at_us = 0;
   std::optional<std::int64_t> started_at_us, ended_at_us;
-  std::vector<ExperimentRun> runs;  // that have begun
+  RunCounts run_counts;
+  std::vector<ExperimentRun> runs;  // that have begun; of one in a list none
 };
 
 // Newest first.

@@ -56,6 +56,15 @@ void read_experiment_runs(SQLite::Database& database, Experiment& experiment) {
     run.has_prediction = rows.getColumn(8).getInt() != 0;
     experiment.runs.push_back(std::move(run));
   }
+  experiment.run_counts = counts_of(experiment.runs);
+}
+
+void count_experiment_runs(SQLite::Statement& rows, Experiment& experiment) {
+  bind_all(rows, experiment.id);
+  while (rows.executeStep()) {
+    const auto state = experiment_state_from(rows.getColumn(0).getString());
+    experiment.run_counts[state.value_or(ExperimentState::interrupted)] += rows.getColumn(1).getUInt();
+  }
 }
 
 void forget_ended(SQLite::Database& database) {
@@ -176,7 +185,9 @@ std::vector<Experiment> list_experiments(SQLite::Database& database, const Exper
   const auto state = filter.state ? std::optional<std::string>{text(*filter.state)} : std::nullopt;
   bind_all(rows, filter.robot_id, state, filter.before, static_cast<std::int64_t>(filter.limit));
   std::vector<Experiment> experiments = experiments_of(rows);
-  for (Experiment& experiment : experiments) read_experiment_runs(database, experiment);
+  SQLite::Statement counts{database,
+                           "SELECT state, count(*) FROM experiment_run WHERE experiment_id = ? GROUP BY state"};
+  for (Experiment& experiment : experiments) count_experiment_runs(counts, experiment);
   return experiments;
 }
 

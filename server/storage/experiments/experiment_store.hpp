@@ -35,6 +35,7 @@ std::vector<station::RobotId> interrupt_experiments(Database& database, std::int
 void note_rest(Database& database, const station::RobotId& robot_id);  // it was seen at rest
 
 std::optional<Experiment> find_experiment(SQLite::Database& database, ExperimentId id);
+// Each with the counts of its runs, and without the runs.
 std::vector<Experiment> list_experiments(SQLite::Database& database, const ExperimentFilter& filter);
 std::vector<Experiment> waiting_experiments(SQLite::Database& database);  // in no order
 // Of a run of an experiment, as JSON; none: there is no such run, or no prediction of it.

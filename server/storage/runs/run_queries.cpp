@@ -140,6 +140,16 @@ std::vector<Run> list_runs(SQLite::Database& database, const BootHeads& heads, c
   return runs;
 }
 
+std::optional<RunConditions> last_flow_of(SQLite::Database& database, const station::RobotId& robot_id) {
+  SQLite::Statement query{database, fmt::format("SELECT {} FROM run WHERE robot_id = ? AND pump_profile <> ''"
+                                                " AND made_afterwards = 0 AND state <> 'discarded'"
+                                                " ORDER BY run_id DESC LIMIT 1",
+                                                kRunColumns)};
+  bind_all(query, robot_id);
+  if (!query.executeStep()) return std::nullopt;
+  return run_from(query).conditions;
+}
+
 std::vector<InterruptedRun> read_interrupted(SQLite::Database& database, const std::vector<RunId>& ids) {
   SQLite::Statement row{
       database,

@@ -23,6 +23,9 @@ std::optional<Run> find_run(SQLite::Database& database, const BootHeads& heads, 
 std::optional<RunState> read_run_state(SQLite::Database& database, RunId id);
 std::vector<Run> list_runs(SQLite::Database& database, const BootHeads& heads, const RunFilter& filter);
 
+// Of the robot's newest run that states the pump's flow; runs that were made afterwards are of an earlier time.
+std::optional<RunConditions> last_flow_of(SQLite::Database& database, const station::RobotId& robot_id);
+
 // A run that was open when the station stopped, or was killed.
 struct InterruptedRun {
   RunId id = 0;

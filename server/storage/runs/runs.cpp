@@ -352,6 +352,11 @@ asio::awaitable<std::vector<Run>> Runs::list(RunFilter filter) {
   co_return co_await reader_.ask(std::move(query));
 }
 
+asio::awaitable<std::optional<RunConditions>> Runs::last_flow(station::RobotId robot_id) {
+  auto query = [robot_id](SQLite::Database& database) { return last_flow_of(database, robot_id); };
+  co_return co_await reader_.ask(std::move(query));
+}
+
 std::map<station::BootId, std::uint64_t> Runs::heads() const {
   std::map<station::BootId, std::uint64_t> heads;
   for (const auto& [robot_id, run_id] : open_runs_) {

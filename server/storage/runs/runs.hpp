@@ -78,6 +78,9 @@ class Runs final : public station::StationSink {
 
   boost::asio::awaitable<std::vector<Run>> list(RunFilter filter);
 
+  // The conditions of the robot's newest run that states the pump's flow; none: no run states one.
+  boost::asio::awaitable<std::optional<RunConditions>> last_flow(station::RobotId robot_id);
+
   void on_robot(const station::RobotState& robot) override;
 
  private:

@@ -49,6 +49,11 @@ TEST_F(ExperimentRoutesTest, IsQueuedRecordedAndShown) {
   const json now = get(1);
   ASSERT_EQ(now["state"], "running") << now;
   EXPECT_EQ(now["runs"][0]["run_id"], 1);
+  EXPECT_EQ(now["run_counts"], (json{{"running", 1}}));
+  const json kept = ask("POST", "/api/v1/experiments/1/keep-alive").parsed();
+  EXPECT_EQ(kept["run_counts"], (json{{"running", 1}}));
+  EXPECT_FALSE(kept.contains("runs")) << "only GET of one gives every run";
+  EXPECT_FALSE(ask("GET", "/api/v1/experiments").parsed()["experiments"][0].contains("runs"));
   EXPECT_THAT(now["profile"].get<std::string>(), HasSubstr("nothing moves"));
   const json run = ask("GET", "/api/v1/runs/1").parsed();
   EXPECT_EQ(run["notes"], "quiet");

@@ -80,6 +80,15 @@ TEST_F(ProfileTool, AProfileMayBeJson) {
   EXPECT_THAT(ask("profile @bad.json").error, HasSubstr("bad.json: step[0].duty: is 2, allowed is -1 to 1"));
 }
 
+TEST_F(ProfileTool, APredictionSaysThatItIsWithoutTheFlow) {
+  save("flow.json", R"({"name": "n", "purpose": "p", "conditions": {"pump": "constant", "mean_flow_m_s": 0.04},
+    "step": [{"kind": "rest", "for_s": 1}]})");
+  EXPECT_THAT(ask("profile @flow.json").text,
+              HasSubstr("The prediction is without the flow of the pump (constant, mean 0.04 m/s).\n"));
+  EXPECT_EQ(ask("profile @flow.json --json").json()["ignores_flow"], true);
+  EXPECT_EQ(ask("profile figure_5 --json").json()["ignores_flow"], false);
+}
+
 TEST_F(ProfileTool, PrintsItsTextWhichIsAProfile) {
   save("mine.toml", ask("profile identification_set --text").text);
   EXPECT_THAT(ask("profile @mine.toml").text, StartsWith("Identification set\n"));
