@@ -190,6 +190,23 @@ void add_verdict(const std::vector<Fit>& fits, std::vector<std::string>& warning
   }
 }
 
+// A sigma is that of a linearised model at the optimum: where the cost is flat away from it, it comes out too small.
+// What says so is a model with whole orders whose AIC is hardly higher; one that is higher by 10 has no support
+// (Burnham and Anderson 2002, 2.6).
+void add_rival(const std::vector<Fit>& fits, std::vector<std::string>& warnings) {
+  constexpr double kNoSupport = 10;
+  const Fit& best = fits.front();
+  if (best.structure != Structure::fractional || fits.size() < 2) return;
+  const Fit& rival = fits[1];  // the best of the others, if its search is finished
+  if (rival.end != SearchEnd::converged || !(rival.aic - best.aic < kNoSupport)) return;
+  std::ostringstream text;
+  text.precision(2);
+  text << "this run cannot determine whether the orders are fractional, so alpha and beta are open: the AIC of the "
+       << structure_name(rival.structure) << " model is higher by " << rival.aic - best.aic
+       << " only (10 would rule it out), whatever their sigmas say; let the duty change faster, during a longer run";
+  warnings.push_back(text.str());
+}
+
 // Of least squares; its slope is the weight of each position.
 double best_offset_m(OutputErrorSearch& search, const SearchPoint& point) {
   const std::vector<int> free = search.free_parameters(Structure::fractional);
@@ -257,6 +274,7 @@ Identification identify(const Recording& recording, const IdentificationOptions&
   add(residual_doubts(recording, options, result.best));
   add(identifiability_warnings(recording, result.best, options));
   add_verdict(result.compared, warnings);
+  add_rival(result.compared, warnings);
   return result;
 }
 
