@@ -23,7 +23,7 @@ double TrueMotion::at(std::uint64_t time_us) const {
 void PaperTest::boot_in(const std::string& fluid, bool has_default_sensor) {
   sim_robot::SimulatedRobotConfig config;
   config.boot_id = switched_off_.size() + 1;
-  config.storage = &board_;
+  config.storage = &board;
   config.world.plant = sim_robot::fluid(fluid);
   config.world.seed = kSeed;
   if (has_default_sensor) config.world.imu.emplace();

@@ -30,6 +30,12 @@ struct TrueStep {
 };
 
 class PaperTest : public ApiTest {
+ public:
+  ~PaperTest() override {
+    tasks.stop();  // the robots outlive their tasks
+    clock.settle();
+  }
+
  protected:
   static constexpr const char* kRobot = "/api/v1/robots/sim-1";
   static constexpr double kSetpoint_m = 0.1, kDisturbance_m = -0.05;
@@ -61,12 +67,12 @@ class PaperTest : public ApiTest {
   void import_truth(const json& experiment);
 
   TrueMotion truth;
+  robot_fw::MemoryStorage board;
   std::unique_ptr<VirtualRobot> swimmer;
 
  private:
   std::uint64_t zeroed_at_us(std::uint64_t before_us);
 
-  robot_fw::MemoryStorage board_;
   std::vector<std::unique_ptr<VirtualRobot>> switched_off_;
   std::int64_t job_id_ = 0;
 };

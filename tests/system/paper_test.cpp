@@ -32,6 +32,16 @@ const json kPaperController{{"kp", 65.0028}, {"kd", 0.0305}, {"mu", 0.6524}};
 std::vector<std::string> warnings_of(const json& fit) { return fit.at("warnings").get<std::vector<std::string>>(); }
 std::int64_t run_of(const json& experiment) { return experiment.at("runs").back().at("run_id"); }
 
+// The closed loop of (30) with an exact position, computed by other means.
+json golden(const char* plant) {
+  const json all = json::parse(std::ifstream(TEST_DATA_DIR "/closed_loop_cases.json"));
+  for (const json& row : all.at("sampled")) {
+    const bool is_nominal = row["duty_limits"] == "-1..1" && row["recurrence_memory"] == "unsaturated";
+    if (row["plant"] == plant && is_nominal) return row;
+  }
+  return nullptr;
+}
+
 class Section5Test : public PaperTest {
  protected:
   // The result has every number by which the robot is sent it; what the robot reports is compared bit for bit.
@@ -127,18 +137,21 @@ class Section5Test : public PaperTest {
     EXPECT_NEAR(step.overshoot_percent, predicted.at("overshoot_percent"), 1);
   }
 
-  void expect_bounds(const TrueStep& step) {
+  static void expect_bounds(const TrueStep& step) {
     EXPECT_LE(step.measured.settling_s.value_or(INFINITY), kLongestSettling_s);
     EXPECT_LE(step.measured.overshoot_percent, kLargestOvershoot_percent);
     EXPECT_LE(std::abs(step.measured.steady_state_error_m), kLargestError_m);
   }
 
-  // The model (28) itself overshoots by 9.8 % of 0.1 m under (30), and 20 % of the 0.05 m of a disturbance (see the
-  // golden loops), so 2.5 % cannot hold in water; and where the error may be 4 mm, the band of 2 mm around the setpoint
-  // may never be reached. Held instead: the error, and that it comes to rest, wherever that is, in time.
-  void expect_bounds_in_water(const TrueStep& step) {
+  // In water the model (28) itself overshoots under (30), by 9.8 % of the step and 20 % of the disturbance, so 2.5 %
+  // cannot hold: allowed is that, and the error. And where the error may be 4 mm the robot may never come within 2 mm
+  // of the setpoint: held is that it comes to rest in time, wherever that is.
+  static void expect_bounds_in_water(const TrueStep& step, const char* which) {
     EXPECT_LE(std::abs(step.measured.steady_state_error_m), kLargestErrorInWater_m);
     EXPECT_LE(step.around_end.settling_s.value_or(INFINITY), kLongestSettling_s);
+    const double move_m = std::string_view{which} == "step" ? kSetpoint_m : -kDisturbance_m;
+    const double of_model_percent = golden("Eq(28)/s").at(which).at("overshoot_pct");
+    EXPECT_LE(step.measured.overshoot_percent, of_model_percent + 100 * kLargestErrorInWater_m / move_m);
   }
 
   // The station measures the same on the true position as the test does; as the controller sees it, with the
@@ -177,7 +190,7 @@ class Section5Test : public PaperTest {
     post(fmt::format("/api/v1/experiments/{}/resume", first.at("experiment_id").get<int>()));
     const json second = await_experiment(first, "done");
     const TrueStep in_water = true_step(second, 0);
-    expect_bounds_in_water(in_water);
+    expect_bounds_in_water(in_water, "step");
     expect_same_by_the_station(second, {in_water});
     return {first, second};
   }
@@ -185,8 +198,8 @@ class Section5Test : public PaperTest {
   json figure_9() {
     const json experiment = perform("figure_9");
     const TrueStep step = true_step(experiment, 0), disturbance = true_step(experiment, 1);
-    expect_bounds_in_water(step);
-    expect_bounds_in_water(disturbance);
+    expect_bounds_in_water(step, "step");
+    expect_bounds_in_water(disturbance, "disturbance");
     expect_same_by_the_station(experiment, {step, disturbance});
     return experiment;
   }
@@ -239,15 +252,6 @@ TEST_F(Section5Test, FromAStepTestToClosedLoopsInTwoFluids) {
 
 class GoldenLoopTest : public PaperTest {
  protected:
-  static json golden(const char* plant) {
-    const json all = json::parse(std::ifstream(TEST_DATA_DIR "/closed_loop_cases.json"));
-    for (const json& row : all.at("sampled")) {
-      const bool is_nominal = row["duty_limits"] == "-1..1" && row["recurrence_memory"] == "unsaturated";
-      if (row["plant"] == plant && is_nominal) return row;
-    }
-    return nullptr;
-  }
-
   // What the controller sees, at the samples of the golden loop.
   static void expect_golden(const json& row, std::initializer_list<TrueStep> steps, double within_m) {
     std::vector<double> seen_m;
