@@ -58,6 +58,7 @@ Identification identify(const Recording& recording, const IdentificationOptions&
   add(residual_doubts(recording, options, result.best));
   add(identifiability_warnings(recording, result.best, options));
   add_verdict(result.compared, 1, warnings);
+  add_rival(result.compared, warnings);
   return result;
 }
 

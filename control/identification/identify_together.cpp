@@ -97,6 +97,7 @@ Identification identify_together(std::span<const Recording> recordings, const Id
   const std::size_t longest = search.longest();
   append(warnings, identifiability_warnings(recordings[longest], result.runs[longest].fit, options, recordings.size()));
   add_verdict(result.compared, recordings.size(), warnings);
+  add_rival(result.compared, warnings);
   return result;
 }
 

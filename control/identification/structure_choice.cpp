@@ -48,4 +48,18 @@ void add_verdict(const std::vector<Fit>& fits, std::size_t runs, std::vector<std
   }
 }
 
+void add_rival(const std::vector<Fit>& fits, std::vector<std::string>& warnings) {
+  constexpr double kNoSupport = 10;
+  const Fit& best = fits.front();
+  if (best.structure != Structure::fractional || fits.size() < 2) return;
+  const Fit& rival = fits[1];  // the best of the others, if its search is finished
+  if (rival.end != SearchEnd::converged || !(rival.aic - best.aic < kNoSupport)) return;
+  std::ostringstream text;
+  text.precision(2);
+  text << "this run cannot determine whether the orders are fractional, so alpha and beta are open: the AIC of the "
+       << structure_name(rival.structure) << " model is higher by " << rival.aic - best.aic
+       << " only (10 would rule it out), whatever their sigmas say; let the duty change faster, during a longer run";
+  warnings.push_back(text.str());
+}
+
 }  // namespace control

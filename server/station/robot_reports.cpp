@@ -215,6 +215,10 @@ void Station::on_controller(RobotLink& link, const protocol::Controller& control
   const ControllerReading reading = read_back(commands_of(sent), entry->reported.settings(), controller);
   const auto record = entry->reported.add(controller, reading.former, moment_of(*entry, parts_->clock));
   parts_->notifier.publish(entry->robot, record);
+  if (entry->robot.controller_checksum != controller.checksum) {  // that of Hello is older
+    entry->robot.controller_checksum = controller.checksum;
+    parts_->notifier.publish(entry->robot);
+  }
   parts_->tracker.on_read_back(*entry, sent, reading.sights);
 }
 

@@ -11,6 +11,7 @@
 namespace control {
 namespace {
 
+using testing::AnyOf;
 using testing::Contains;
 using testing::HasSubstr;
 using testing::IsEmpty;
@@ -140,6 +141,31 @@ TEST(IdentifyDoubts, ThePlanIsNotTheRunThatWasMade) {
   EXPECT_THAT(warnings, Contains(HasSubstr("cannot determine")));
   EXPECT_THAT(warnings, Not(Contains(HasSubstr("would give"))));
   EXPECT_THAT(warnings, Contains(HasSubstr("make the run longer")));
+}
+
+// Whatever the noise: the sigmas are large, or a model with whole orders is better, or hardly worse.
+TEST(IdentifyDoubts, OneStepDoesNotDetermineTheOrders) {
+  std::vector<double> duty(800, 0);
+  std::fill(duty.begin() + 100, duty.begin() + 600, 0.3);
+  IdentificationOptions options = unhurried_options();
+  options.further_starts = 1;
+  int hardly_worse = 0;
+  for (unsigned seed = 1; seed <= 6; ++seed) {
+    Recording run{0.01, duty, {}, {}, output_of(kNonNewtonianModel, Channel::acceleration, 0.01, duty)};
+    add_noise(run.acceleration_m_s2, 0.012, seed);
+    const std::vector<std::string> warnings = identify(run, options).warnings;
+    EXPECT_THAT(warnings, Contains(AnyOf(HasSubstr("cannot determine"), HasSubstr("does not call for")))) << seed;
+    const auto names_a_rival = [](const std::string& one) { return one.contains("second order model is higher by"); };
+    hardly_worse += std::ranges::any_of(warnings, names_a_rival) ? 1 : 0;
+  }
+  EXPECT_GT(hardly_worse, 0);
+}
+
+TEST(IdentifyDoubts, AFastDutyDeterminesThem) {
+  const Recording run = position_run(kNonNewtonianModel, prbs_duty(1, 0.2, 60, 0.01), 1.16e-3, 4);
+  IdentificationOptions options = unhurried_options();
+  options.further_starts = 0;
+  EXPECT_THAT(identify(run, options).warnings, Not(Contains(HasSubstr("cannot determine"))));
 }
 
 TEST(IdentifyDoubts, ADeadTimeAtItsLimitComesFirst) {

@@ -41,6 +41,15 @@ TEST_F(ExperimentsTest, EachStepBeginsInItsTickOfTheRobot) {
   EXPECT_EQ(state().context.mode, rheonaut_MODE_MANUAL);
 }
 
+TEST_F(ExperimentsTest, ARunBeginsBehindItsZero) {
+  const auto id = start(profile({kSetpoint}));
+  until(id, ExperimentState::done);
+  const auto zeroed = std::ranges::find(events(), "position_zeroed", &sim_robot::ReceivedEvent::kind);
+  ASSERT_NE(zeroed, events().end());
+  const auto samples = samples_of_first_run(id);
+  EXPECT_GE(1e-6 * static_cast<double>(samples.front().robot_time_us), zeroed->robot_time_s - 1e-9);
+}
+
 TEST_F(ExperimentsTest, TheRobotDoesEveryTickOfASignal) {
   const char* chirp = "kind = \"chirp\"\namplitude = 0.4\nfrom_hz = 0.3\nto_hz = 3\nfor_s = 12";
   const std::string document = profile({kRest, chirp, kRest});

@@ -48,6 +48,7 @@ asio::awaitable<void> VirtualRobot::tick() {
   for (std::uint64_t seq = 0;; ++seq) {
     co_await clock_.sleep_until(tick_at_us(seq));
     robot_.step();
+    if (on_tick) on_tick();
     if (link_ && robot_.core().connection_is_silent(now_us())) lose(link_);
     pump();
   }

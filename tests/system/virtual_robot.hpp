@@ -7,6 +7,7 @@
 // Loop thread. Outlives its tasks: stop the group and settle the clock before it goes.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <vector>
 
@@ -32,7 +33,8 @@ class VirtualRobot {
   // When sample `seq` is made, on the test's clock.
   std::int64_t tick_at_us(std::uint64_t seq) const { return booted_at_us_ + static_cast<std::int64_t>(seq) * 10'000; }
 
-  bool redial = true;  // dials again 0.5 s after the link has ended
+  bool redial = true;             // dials again 0.5 s after the link has ended
+  std::function<void()> on_tick;  // after each one, for who records the simulated world
 
  private:
   struct Link;

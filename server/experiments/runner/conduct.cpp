@@ -18,6 +18,7 @@ namespace {
 
 constexpr microseconds kLook = 200ms;
 constexpr microseconds kModelWithin = 30s;
+constexpr microseconds kSamplesWithin = 3s;
 constexpr double kWayBack_s = 15;  // for a robot to go back to where its run begins
 
 json json_of(const Variant& variant) {
@@ -191,7 +192,7 @@ asio::awaitable<void> Conduct::await_model() {
   }
 }
 
-asio::awaitable<void> Conduct::submit(const char* what, protocol::Command command, std::string arguments) {
+asio::awaitable<std::uint64_t> Conduct::submit(const char* what, protocol::Command command, std::string arguments) {
   station::CommandRequest request;
   request.robot_id = experiment_.request.robot_id;
   request.action = command;
@@ -202,10 +203,11 @@ asio::awaitable<void> Conduct::submit(const char* what, protocol::Command comman
   request.until_verified = command.which_action == rheonaut_Command_set_controller_tag;
   const auto sent = co_await parts_.driver.station.submit(std::move(request));
   if (sent && was_accepted(sent->state) && (sent->reason.empty() || sent->state == station::CommandState::verified)) {
-    co_return;
+    co_return sent->effect_at_robot_us;
   }
   const std::string why = sent ? fmt::format("{} {}", text(sent->state), sent->reason) : sent.error().detail;
   abort({"command_refused", fmt::format("{}: {}", what, why)});
+  co_return 0;
 }
 
 asio::awaitable<void> Conduct::send_controller(std::string name) {
@@ -233,7 +235,18 @@ asio::awaitable<void> Conduct::go_to_start() {
   protocol::Command command = rheonaut_Command_init_zero;
   command.which_action = rheonaut_Command_zero_position_tag;
   std::string no_arguments = "{}";
-  co_await submit("zero_position", command, std::move(no_arguments));
+  const std::uint64_t zeroed_at_us = co_await submit("zero_position", command, std::move(no_arguments));
+  co_await await_samples_from(zeroed_at_us);
+}
+
+// Samples of before may still be on their way. A run begins behind them, so that one zero holds for all of it: else no
+// position that was measured from outside could be placed in it.
+asio::awaitable<void> Conduct::await_samples_from(std::uint64_t robot_us) {
+  const std::int64_t ends_us = parts_.driver.clock.steady_us() + kSamplesWithin.count();
+  while (!abort_ && sampled_until_us_ < robot_us) {
+    if (parts_.driver.clock.steady_us() > ends_us) abort({"missing_samples", "no sample of after the zero arrived"});
+    co_await changed_.wait_until(parts_.driver.clock, parts_.driver.clock.steady_us() + kLook.count());
+  }
 }
 
 // --- the run and its prediction ---
@@ -367,7 +380,10 @@ const Abort* Conduct::pause_reason() const {
 }
 
 void Conduct::on_samples(const station::SampleBatch& batch) {
-  if (driver_) driver_->on_samples(batch);
+  if (driver_) return driver_->on_samples(batch);
+  if (batch.samples.empty()) return;
+  sampled_until_us_ = batch.first_robot_time_us + (batch.samples.size() - 1) * batch.context.period_us;
+  changed_.notify();
 }
 
 // SAFETY: what was prepared is lost with the boot. While the fluid is changed the robot may be switched off.

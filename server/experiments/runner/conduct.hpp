@@ -72,11 +72,13 @@ class Conduct {
   boost::asio::awaitable<void> await_model();
   boost::asio::awaitable<void> send_controller(std::string name);
   boost::asio::awaitable<void> go_to_start();
+  boost::asio::awaitable<void> await_samples_from(std::uint64_t robot_us);
   boost::asio::awaitable<void> begin_recording(const Variant& variant, const TimeLine& line);
   boost::asio::awaitable<std::string> predict(const TimeLine& line);
   boost::asio::awaitable<DriveEnd> drive(TimeLine line);
   boost::asio::awaitable<void> end_recording();
-  boost::asio::awaitable<void> submit(const char* what, protocol::Command command, std::string arguments);
+  // The robot time at which it acts; aborts if it is refused.
+  boost::asio::awaitable<std::uint64_t> submit(const char* what, protocol::Command command, std::string arguments);
   storage::RunConditions conditions_of(const Variant& variant) const;
   void take_control();
   void check_robot();
@@ -92,6 +94,7 @@ class Conduct {
   std::optional<Abort> abort_;
   std::optional<Abort> waiting_for_;  // paused while no driver is at work
   station::BootId boot_id_ = 0;
+  std::uint64_t sampled_until_us_ = 0;  // of the latest batch that arrived while no driver is at work, robot time
   bool is_resumed_ = false;
   std::uint32_t number_ = 0;
   std::vector<storage::ExperimentRun> begun_;

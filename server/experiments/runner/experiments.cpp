@@ -50,7 +50,6 @@ Experiments::~Experiments() = default;
 
 asio::awaitable<void> Experiments::run() {
   co_await load();
-  is_loaded_ = true;
   std::int64_t published_us = 0;
   for (;;) {
     put_interrupted_to_rest();

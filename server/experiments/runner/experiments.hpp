@@ -108,7 +108,7 @@ class Experiments final : public station::StationSink {
                                   const std::string& fluid);
 
   boost::asio::awaitable<void> load();
-  boost::asio::awaitable<void> admit(storage::Experiment waiting);  // that an earlier start has left
+  boost::asio::awaitable<void> admit(std::vector<storage::Experiment> waiting);  // that an earlier start has left
   boost::asio::awaitable<void> carry_out(storage::ExperimentId id);
   boost::asio::awaitable<void> conduct(Entry& entry);
   boost::asio::awaitable<void> finish(Entry& entry);

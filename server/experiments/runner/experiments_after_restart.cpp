@@ -49,20 +49,21 @@ asio::awaitable<void> Experiments::load() {
     if (!left) co_await parts_.clock.sleep_for(kReadAgainAfter);
   }
   to_rest_ = {left->to_rest.begin(), left->to_rest.end()};
-  for (Experiment& experiment : left->waiting) {
-    co_await admit(std::move(experiment));
-    put_interrupted_to_rest();
-  }
+  spawn("queues of the last start", admit(std::move(left->waiting)));
 }
 
-// A long profile is parsed on the worker, since the loop has other work meanwhile.
-asio::awaitable<void> Experiments::admit(Experiment waiting) {
-  auto parse = [waiting] { return profile_of(waiting); };
-  auto profile = co_await maths_.run(std::move(parse));
-  Entry& entry = entries_[waiting.id];
-  entry.experiment = std::move(waiting);
-  entry.is_unreadable = !profile;
-  if (profile) entry.profile = std::move(*profile);
+// Profiles are parsed on the worker, one after another, beside run(), which brings robots to rest meanwhile. All of
+// these experiments are held.
+asio::awaitable<void> Experiments::admit(std::vector<Experiment> waiting) {
+  for (Experiment& experiment : waiting) {
+    auto parse = [experiment] { return profile_of(experiment); };
+    auto profile = co_await maths_.run(std::move(parse));
+    Entry& entry = entries_[experiment.id];
+    entry.experiment = std::move(experiment);
+    entry.is_unreadable = !profile;
+    if (profile) entry.profile = std::move(*profile);
+  }
+  is_loaded_ = true;
 }
 
 // SAFETY: the robot of an experiment that a restart interrupted goes on in auto, if its link held; nobody watches it.

@@ -6,11 +6,12 @@ namespace {
 
 class ReportedInForceTest : public LinkTest {
  protected:
-  void say_controller(TestRobot& robot, float kp, std::uint64_t robot_time_us) {
+  void say_controller(TestRobot& robot, float kp, std::uint64_t robot_time_us, std::uint32_t checksum = 0) {
     protocol::RobotFrame frame = rheonaut_RobotFrame_init_zero;
     frame.which_body = rheonaut_RobotFrame_controller_tag;
     frame.robot_time_us = robot_time_us;
     frame.body.controller.kp = kp;
+    frame.body.controller.checksum = checksum;
     robot.send(frame);
     clock.settle();
   }
@@ -52,6 +53,14 @@ TEST_F(ReportedInForceTest, WhatARobotSaysWhenItConnectsAgainIsNoChange) {
   EXPECT_FALSE(latest().is_change);
   EXPECT_GE(latest().first_seq, 300U);
   EXPECT_LE(latest().first_seq, 302U);
+}
+
+TEST_F(ReportedInForceTest, TheChecksumOfTheControllerIsThatOfTheLastReport) {
+  auto* robot = connect();
+  say_controller(*robot, 1, robot->robot_now_us(), 77);
+  EXPECT_EQ(station.find("r1")->controller_checksum, 77U);
+  say_controller(*robot, 2, robot->robot_now_us(), 78);
+  EXPECT_EQ(station.find("r1")->controller_checksum, 78U);
 }
 
 }  // namespace
