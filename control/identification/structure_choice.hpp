@@ -21,8 +21,8 @@ std::vector<std::string> untried_structures(const std::vector<Fit>& fits);
 // That fractional orders are not called for by so many runs; only finished searches can say so.
 void add_verdict(const std::vector<Fit>& fits, std::size_t runs, std::vector<std::string>& warnings);
 
-// That whole orders are hardly worse: a sigma is that of a linearised model at the optimum, and too small where the cost
-// is flat away from it. A model whose AIC is higher by 10 has no support (Burnham and Anderson 2002, 2.6).
+// That whole orders are hardly worse: a sigma is that of a linearised model at the optimum, and too small where the
+// cost is flat away from it. A model whose AIC is higher by 10 has no support (Burnham and Anderson 2002, 2.6).
 void add_rival(const std::vector<Fit>& fits, std::vector<std::string>& warnings);
 
 }  // namespace control

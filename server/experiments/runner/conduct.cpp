@@ -16,9 +16,7 @@ using nlohmann::json;
 
 namespace {
 
-constexpr microseconds kLook = 200ms;
-constexpr microseconds kModelWithin = 30s;
-constexpr microseconds kSamplesWithin = 3s;
+constexpr microseconds kLook = 200ms, kModelWithin = 30s, kSamplesWithin = 3s;
 constexpr double kWayBack_s = 15;  // for a robot to go back to where its run begins
 
 json json_of(const Variant& variant) {
