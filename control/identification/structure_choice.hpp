@@ -18,7 +18,7 @@ void put_best_first(std::vector<Fit>& fits);
 // Of fits in that order: those that were not tried, or not to the end.
 std::vector<std::string> untried_structures(const std::vector<Fit>& fits);
 
-// That fractional orders are not called for by so many runs; only finished searches can say so.
+// That fractional orders are not called for by this number of runs; only finished searches can say so.
 void add_verdict(const std::vector<Fit>& fits, std::size_t runs, std::vector<std::string>& warnings);
 
 // That whole orders are hardly worse: a sigma is that of a linearised model at the optimum, and too small where the

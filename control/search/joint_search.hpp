@@ -44,7 +44,7 @@ class JointSearch {
   std::size_t longest() const { return longest_; }  // of the runs, by its samples
   OutputErrorSearch& of_run(std::size_t run) { return *searches_[run]; }
 
-  // Of recorded accelerations, before the first run(): so many structures will be searched after it.
+  // Of recorded accelerations, before the first run(): the number of structures that will be searched after it.
   void find_sensors(int structures);
   // Within one of parts equal shares of the time that is left. With no time at all the result is the paper's start.
   JointResult run(Structure structure, int parts = 1);

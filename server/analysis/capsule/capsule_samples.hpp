@@ -19,7 +19,7 @@ struct CapsuleSamples {
   std::optional<storage::StoredReference> reference;
 };
 
-// invalid: it is not an export of a run, or has more than so many samples.
+// invalid: it is not an export of a run, or has more samples than that.
 Result<CapsuleSamples> read_capsule_samples(const std::filesystem::path& file, std::size_t limit);
 
 }  // namespace server::analysis
