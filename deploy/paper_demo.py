@@ -126,7 +126,7 @@ class Section5:
         return path
 
     def name_fluid(self, fluid):
-        """By whoever has put the robot there; the page does it, and scripts by this call."""
+        """By the person who has put the robot there; the page does it, and scripts by this call."""
         say(f"  POST /api/v1/robots/{ROBOT}/fluid {fluid}")
         self.station.post(f"/api/v1/robots/{ROBOT}/fluid", {"fluid": fluid})
         wait_until(lambda: self.station.robot(ROBOT)["model"]["state"] != "sending", 30, "the model on the robot")
