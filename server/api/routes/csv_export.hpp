@@ -63,7 +63,7 @@ class ExportFile {
 
 using ExportFilePtr = std::unique_ptr<ExportFile, EndOnWorker>;
 
-// An empty file for what is made of these samples, with this number of rows for each; low_space: there is no room for it.
+// An empty file for what is made of these samples, with this number of rows each; low_space: there is no room for it.
 boost::asio::awaitable<Result<ExportFilePtr>> begin_export_file(ExportRoutes parts,
                                                                 std::vector<storage::RecordedSpan> spans,
                                                                 std::uint64_t rows_per_sample, const char* ending);
