@@ -1,6 +1,7 @@
 // Predicts the uncertainty of a planned experiment's fit, and makes duties for it.
 #include "control/identification/planned_experiment.hpp"
 
+#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -61,6 +62,28 @@ void check_amplitude(double amplitude) {
   if (!(std::abs(amplitude) <= kLargestDuty)) refuse("amplitude must be finite and at most 1000, is", amplitude);
 }
 
+// What `of_model` says of the model while the unknowns of `of_others` are free too: the part of its columns that no
+// combination of those can follow, as a triangle.
+Eigen::MatrixXd without(const Eigen::MatrixXd& of_others, const Eigen::MatrixXd& of_model) {
+  Eigen::MatrixXd left = of_model;
+  if (of_others.cols() > 0) {
+    const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> others(of_others);
+    const Eigen::MatrixXd rotated = others.householderQ().adjoint() * of_model;
+    left = rotated.bottomRows(rotated.rows() - others.rank());
+  }
+  const Eigen::HouseholderQR<Eigen::MatrixXd> rest(left);
+  return rest.matrixQR().topRows(std::min(left.rows(), left.cols())).triangularView<Eigen::Upper>();
+}
+
+// A triangle with the information of both.
+Eigen::MatrixXd joined(const Eigen::MatrixXd& one, const Eigen::MatrixXd& other) {
+  if (one.rows() == 0) return other;
+  Eigen::MatrixXd both(one.rows() + other.rows(), one.cols());
+  both << one, other;
+  const Eigen::HouseholderQR<Eigen::MatrixXd> qr(both);
+  return qr.matrixQR().topRows(std::min(both.rows(), both.cols())).triangularView<Eigen::Upper>();
+}
+
 Index sample_count(double duration_s, double dt_s) {
   if (!(dt_s > 0 && std::isfinite(dt_s))) refuse("dt_s must be positive, is", dt_s);
   if (!(duration_s >= dt_s && std::round(duration_s / dt_s) < static_cast<double>(kMostSamples))) {
@@ -71,40 +94,53 @@ Index sample_count(double duration_s, double dt_s) {
 
 }  // namespace
 
-ExpectedUncertainty expected_uncertainty(const FractionalModel& given, const PlannedExperiment& experiment) {
-  check(given);
+ExpectedInformation::ExpectedInformation(const FractionalModel& model) {
+  check(model);
+  model_ = normalised(model);
+  rows_.resize(0, static_cast<Index>(free_parameters(model_).size()));
+}
+
+void ExpectedInformation::add(const PlannedExperiment& experiment) {
   check(experiment);
-  const FractionalModel model = normalised(given);
-  const std::vector<Index> free = free_parameters(model);
-  const Index samples = static_cast<Index>(experiment.duty.size());
+  const std::vector<Index> free = free_parameters(model_);
+  const auto samples = static_cast<Index>(experiment.duty.size()), count = static_cast<Index>(free.size());
   const bool has_acceleration = experiment.acceleration_sd_m_s2 > 0;
-  const Index offset = static_cast<Index>(free.size()), sensor = offset + (experiment.fits_offset ? 1 : 0);
-  const Index columns = sensor + (has_acceleration ? kSensorUnknowns : 0);
-  Eigen::MatrixXd jacobian(0, columns);
-  const auto add = [&](Channel channel, double sd) {
+  const Index sensor = experiment.fits_offset ? 1 : 0;
+  Eigen::MatrixXd of_model(0, count), of_others(0, sensor + (has_acceleration ? kSensorUnknowns : 0));
+  const auto add_channel = [&](Channel channel, double sd) {
     if (sd == 0) return;
-    OutputModel output(channel, experiment.dt_s, experiment.duty, model.dead_time_s, kModelTolerance);
-    output.set_delay(model.dead_time_s);
-    const Index row = jacobian.rows();
-    jacobian.conservativeResize(row + samples, Eigen::NoChange);
-    jacobian.bottomRows(samples).setZero();
-    jacobian.block(row, 0, samples, static_cast<Index>(free.size())) = output.jacobian(model)(Eigen::all, free) / sd;
-    if (experiment.fits_offset) {
-      jacobian.col(offset).tail(samples).setConstant(channel == Channel::position ? 1 / sd : 0);
-    }
+    OutputModel output(channel, experiment.dt_s, experiment.duty, model_.dead_time_s, kModelTolerance);
+    output.set_delay(model_.dead_time_s);
+    const Index row = of_model.rows();
+    of_model.conservativeResize(row + samples, Eigen::NoChange);
+    of_others.conservativeResize(row + samples, Eigen::NoChange);
+    of_others.bottomRows(samples).setZero();
+    of_model.bottomRows(samples) = output.jacobian(model_)(Eigen::all, free) / sd;
+    if (experiment.fits_offset) of_others.col(0).tail(samples).setConstant(channel == Channel::position ? 1 / sd : 0);
     if (channel == Channel::acceleration) {
-      jacobian.col(sensor).tail(samples).setConstant(1 / sd);
-      jacobian.col(sensor + 1).tail(samples).setLinSpaced(0, 1 / sd);
-      jacobian.col(sensor + 2).tail(samples) = output.slope(model) / sd;
+      of_others.col(sensor).tail(samples).setConstant(1 / sd);
+      of_others.col(sensor + 1).tail(samples).setLinSpaced(0, 1 / sd);
+      of_others.col(sensor + 2).tail(samples) = output.slope(model_) / sd;
     }
   };
-  add(Channel::position, experiment.position_sd_m);
-  add(Channel::velocity, experiment.velocity_sd_m_s);
-  add(Channel::acceleration, experiment.acceleration_sd_m_s2);
+  add_channel(Channel::position, experiment.position_sd_m);
+  add_channel(Channel::velocity, experiment.velocity_sd_m_s);
+  add_channel(Channel::acceleration, experiment.acceleration_sd_m_s2);
+  rows_ = joined(rows_, without(of_others, of_model));
+}
 
-  const Uncertainty found = uncertainty(jacobian);
-  const std::array<double, kParameters> unit{std::abs(model.kp), model.b1, model.b2, 1, 1};  // ln kp to kp, and so on
+void ExpectedInformation::add(const ExpectedInformation& others, int times) {
+  const Eigen::MatrixXd added = others.rows_ * std::sqrt(static_cast<double>(times));
+  rows_ = joined(rows_, added);
+}
+
+ExpectedUncertainty ExpectedInformation::uncertainty() const {
   ExpectedUncertainty result;
+  if (rows_.rows() == 0) return result;
+  const std::vector<Index> free = free_parameters(model_);
+  const Uncertainty found = control::uncertainty(rows_);
+  const std::array<double, kParameters> unit{std::abs(model_.kp), model_.b1, model_.b2, 1,
+                                             1};  // ln kp to kp, and so on
   for (std::size_t i = 0; i < free.size(); ++i) {
     const auto row = static_cast<std::size_t>(free[i]);
     if (found.one_sigma[i]) result.one_sigma[row] = *found.one_sigma[i] * unit[row];
@@ -114,6 +150,12 @@ ExpectedUncertainty expected_uncertainty(const FractionalModel& given, const Pla
     }
   }
   return result;
+}
+
+ExpectedUncertainty expected_uncertainty(const FractionalModel& model, const PlannedExperiment& experiment) {
+  ExpectedInformation information{model};
+  information.add(experiment);
+  return information.uncertainty();
 }
 
 std::vector<double> step_duty(double amplitude, double duration_s, double dt_s) {

@@ -1,8 +1,9 @@
-// How well a planned experiment would determine a model's parameters, and duties for such plans.
+// How well planned experiments would determine a model's parameters, and duties for such plans.
 //
 // (5) is that of identify.hpp. Errors: throws std::invalid_argument quoting the bad value.
 #pragma once
 
+#include <Eigen/Core>
 #include <array>
 #include <optional>
 #include <vector>
@@ -29,6 +30,22 @@ struct ExpectedUncertainty {
 };
 
 ExpectedUncertainty expected_uncertainty(const FractionalModel& model, const PlannedExperiment& experiment);
+
+// The same for several experiments on one robot in one fluid: each has unknowns of its own (offset, bias, drift, lag),
+// and they share the model.
+class ExpectedInformation {
+ public:
+  explicit ExpectedInformation(const FractionalModel& model);
+
+  void add(const PlannedExperiment& experiment);
+  void add(const ExpectedInformation& others, int times = 1);  // of the same model
+
+  ExpectedUncertainty uncertainty() const;  // nothing is determined before the first experiment
+
+ private:
+  FractionalModel model_;
+  Eigen::MatrixXd rows_;  // its Gram matrix is the information on the model's free parameters
+};
 
 // Duties for such plans: a step, and a pseudo-random binary sequence of ±amplitude.
 std::vector<double> step_duty(double amplitude, double duration_s, double dt_s);

@@ -132,6 +132,18 @@ class Cut {
 
   bool is_whole() const { return faults_.empty(); }
 
+  // The longest window without a fault; none: each is too short.
+  std::optional<RunWindow> longest(const Piece& piece, RunWindow window) const {
+    if (parts_.empty()) return std::nullopt;
+    const Part& part = *std::ranges::max_element(parts_, {}, &Part::size);
+    if (part.size() < kFewestSamples) return std::nullopt;
+    window.span = piece.samples[part.begin].span;
+    window.from_s = piece.seconds(piece.samples[part.begin]);
+    window.to_s = piece.seconds(piece.samples[part.end - 1]);
+    window.cuts_at_gaps = false;
+    return window;
+  }
+
   // Every fault, up to a few, and the longest windows that have none.
   std::unexpected<Error> refusal(const Piece& piece) const {
     std::string detail = fmt::format("not a whole recording: {}",
@@ -264,7 +276,18 @@ Result<RunRecording> recording_of(std::span<const storage::StoredSample> samples
                         : position_sd_m > 0 ? Motion::acceleration
                                             : Motion::position;
   const Cut cut{*piece, window, dt_s, motion};
-  if (!cut.is_whole()) return cut.refusal(*piece);
+  if (!cut.is_whole()) {
+    const auto part = window.cuts_at_gaps ? cut.longest(*piece, window) : std::nullopt;
+    if (!part) return cut.refusal(*piece);
+    auto recorded = recording_of(samples, *part, reference, choice);
+    if (recorded) {
+      recorded->warnings.push_back(
+          fmt::format("the recording has gaps: fitted is its longest part without one, from "
+                      "{:.3f} to {:.3f} s",
+                      part->from_s, part->to_s));
+    }
+    return recorded;
+  }
   RunRecording made{{}, channels_reason(position_sd_m), {}};
   control::Recording& recording = made.recording;
   recording.dt_s =

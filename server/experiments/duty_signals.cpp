@@ -65,7 +65,8 @@ std::vector<DutyChange> multisine(const Step& step) {
 std::vector<DutyChange> prbs(const Step& step) {
   std::vector<DutyChange> changes;
   const std::vector<double> duty = control::prbs_duty(step.amplitude, step.bit_s, step.for_s, kTick_s);
-  for (std::size_t tick = 0; tick < duty.size(); ++tick) change(changes, tick, step.mean_duty + duty[tick]);
+  // Without its last value, which is that of the end: there the next step begins.
+  for (std::uint64_t tick = 0; tick < ticks_of(step); ++tick) change(changes, tick, step.mean_duty + duty.at(tick));
   return changes;
 }
 

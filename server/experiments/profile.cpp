@@ -1,7 +1,11 @@
 #include "server/experiments/profile.hpp"
 
+#include <fmt/format.h>
+
 #include <array>
 #include <utility>
+
+#include "control/search/fit.hpp"
 
 namespace server::experiments {
 namespace {
@@ -25,8 +29,27 @@ std::span<const char* const> pump_flows() { return kPumpFlows; }
 
 std::span<const char* const> start_positions() { return kStartPositions; }
 
+std::string text(const Until& until) {
+  return fmt::format("sigma({}) <= {}", control::kParameterNames.at(until.parameter), until.sigma);
+}
+
+Profile profile_of_run(const Profile& profile, const Variant& variant) {
+  Profile of_run = profile;
+  of_run.until.reset();
+  if (variant.step > 0) of_run.steps = {profile.steps.at(variant.step - 1)};
+  return of_run;
+}
+
 std::vector<Variant> variants_of(const Profile& profile) {
   std::vector<Variant> variants;
+  if (profile.until) {
+    for (std::size_t step = 1; step <= profile.steps.size(); ++step) {
+      for (const double duty_factor : axis(profile.sweep.duty_factor, 1.0)) {
+        variants.push_back({profile.conditions.fluid, "", duty_factor, 1, 1, step});
+      }
+    }
+    return variants;
+  }
   for (const std::string& fluid : axis(profile.sweep.fluids, profile.conditions.fluid)) {
     for (const std::string& controller : axis(profile.sweep.controllers, std::string{})) {
       for (const double setpoint_factor : axis(profile.sweep.setpoint_factor, 1.0)) {

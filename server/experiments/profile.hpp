@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -91,6 +92,14 @@ struct Sweep {
   std::uint64_t repeats = 1;
 };
 
+// The experiment goes on until a parameter of the robot's model is known so well.
+struct Until {
+  std::size_t parameter = 0;  // index of control::kParameterNames
+  double sigma = 0;           // one sigma of it, at most
+};
+
+inline constexpr std::uint64_t kMostRunsUntilKnown = 8;  // that one fit takes
+
 struct Profile {
   std::string name, purpose;
   Conditions conditions;
@@ -99,6 +108,9 @@ struct Profile {
   // SAFETY: of a profile in which all steps are closed-loop: it may go on while nobody is there, for the robot's
   // auto_limit_s at most, where the station's configuration allows it.
   bool is_unattended = false;
+  // If given, the steps are a choice: each run performs one of them, with one of the sweep's duty factors.
+  std::optional<Until> until;
+  std::uint64_t most_runs = kMostRunsUntilKnown;  // with until
   std::vector<Step> steps;
   Sweep sweep;
 };
@@ -108,8 +120,14 @@ struct Variant {
   std::string fluid{}, controller{};  // empty: the fluid that the robot is in, and the controller in force
   double duty_factor = 1, setpoint_factor = 1;
   std::uint64_t repeat = 1;
+  std::size_t step = 0;  // from 1, the only one that it performs; 0: all of them
 };
-// All of them; repeats of one combination follow each other.
+// All of them; repeats of one combination follow each other. With until: what each run may be.
 std::vector<Variant> variants_of(const Profile& profile);
+
+std::string text(const Until& until);  // "sigma(alpha) <= 0.02"
+
+// What the run performs: the steps of the profile, or the only one of them.
+Profile profile_of_run(const Profile& profile, const Variant& variant);
 
 }  // namespace server::experiments

@@ -54,7 +54,8 @@ void add_tones(const Step& step, double factor, std::size_t index, TimeLine& lin
 
 }  // namespace
 
-TimeLine time_line_of(const Profile& profile, const Variant& variant) {
+TimeLine time_line_of(const Profile& all, const Variant& variant) {
+  const Profile profile = profile_of_run(all, variant);
   TimeLine line;
   double setpoint_m = 0;
   bool is_auto = false;
@@ -94,6 +95,10 @@ double longest_duration_s(const Profile& profile) {
   std::uint64_t ticks = 0;
   double setpoint_m = 0;
   bool is_auto = false;
+  if (profile.until) {
+    for (const Step& step : profile.steps) ticks = std::max(ticks, ticks_of(step));
+    return static_cast<double>(ticks) * kTick_s;
+  }
   for (const Step& step : profile.steps) {
     const ModeChange change = mode_change_at(step, is_auto);
     if (step.kind == StepKind::scan) {

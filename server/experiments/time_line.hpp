@@ -23,7 +23,7 @@ struct Action {
 
 struct TimeLine {
   std::vector<Action> actions;             // by tick; the last one sets duty 0 if a duty step ends the profile
-  std::vector<std::uint64_t> step_begins;  // tick of each step
+  std::vector<std::uint64_t> step_begins;  // tick of each step of profile_of_run()
   std::uint64_t ticks = 0;                 // of the run
   double duration_s() const { return static_cast<double>(ticks) * kTick_s; }
 };

@@ -304,6 +304,25 @@ TEST(ExpectedUncertainty, IsThatOfTheReferencePlans) {
                std::invalid_argument);
 }
 
+TEST(ExpectedInformation, OfSeveralExperimentsAddsUpAndEachHasUnknownsOfItsOwn) {
+  const FractionalModel model;
+  PlannedExperiment fast{0.01, prbs_duty(0.6, 0.2, 20, 0.01)}, slow{0.01, prbs_duty(0.6, 1, 20, 0.01)};
+  fast.acceleration_sd_m_s2 = slow.acceleration_sd_m_s2 = 0.05;
+  const double one = expected_uncertainty(model, fast).one_sigma[3].value();
+  ExpectedInformation four{model};
+  EXPECT_FALSE(four.uncertainty().one_sigma[0]) << "nothing was added";
+  for (int i = 0; i < 4; ++i) four.add(fast);
+  EXPECT_NEAR(four.uncertainty().one_sigma[3].value(), one / 2, 1e-6 * one);
+  ExpectedInformation once{model}, other{model}, both{model};
+  once.add(fast);
+  other.add(once, 4);
+  EXPECT_NEAR(other.uncertainty().one_sigma[3].value(), one / 2, 1e-6 * one);
+  both.add(slow);
+  both.add(once);
+  EXPECT_LT(both.uncertainty().one_sigma[3].value(), expected_uncertainty(model, slow).one_sigma[3].value());
+  EXPECT_LT(both.uncertainty().one_sigma[3].value(), one);
+}
+
 TEST(Duties, HaveTheirShape) {
   EXPECT_EQ(step_duty(0.3, 5, 0.01), std::vector<double>(501, 0.3));
   const std::vector<double> duty = prbs_duty(0.5, 0.2, 60, 0.01);

@@ -15,12 +15,17 @@ void require(bool condition) {
   if (!condition) std::abort();
 }
 
-void require_within(const Profile& profile, const TimeLine& line) {
+void require_within(const Profile& all, const Variant& variant) {
+  const Profile profile = profile_of_run(all, variant);
+  const TimeLine line = time_line_of(all, variant);
   const ProfileLimits& limits = profile.limits;
   require(line.duration_s() <= limits.duration_max_s + kTick_s);
   require(line.step_begins.size() == profile.steps.size());
   std::uint64_t tick = 0;
+  const Action* last_duty = nullptr;  // a robot takes no two duties for one tick
   for (const Action& action : line.actions) {
+    if (action.kind == ActionKind::duty) require(last_duty == nullptr || action.tick > last_duty->tick);
+    if (action.kind == ActionKind::duty) last_duty = &action;
     require(action.tick >= tick && action.tick <= line.ticks && std::isfinite(action.value));
     tick = action.tick;
     if (action.kind == ActionKind::duty) require(std::abs(action.value) <= limits.duty_max + 1e-9);
@@ -39,8 +44,8 @@ void read(std::string_view text) {
   }
   const std::vector<Variant> variants = variants_of(profile);
   require(!variants.empty() && variants.size() <= kMostRuns);
-  require_within(profile, time_line_of(profile, variants.front()));
-  require_within(profile, time_line_of(profile, variants.back()));
+  require_within(profile, variants.front());
+  require_within(profile, variants.back());
 }
 
 }  // namespace

@@ -162,10 +162,26 @@ Result<void> read_runs(const Members& body, std::vector<analysis::RunPart>& runs
 
 Result<analysis::IdentifyRequest> identify_request(const Members& body) {
   using analysis::ChannelChoice;
-  if (const auto known =
-          body.only({"kind", "run_id", "runs", "span", "from_s", "to_s", "channels", "structure", "cost", "fits_offset",
-                     "dead_time_s", "sensor_lag_s", "time_limit_s", "with_velocity", "residuals", "validation_run_id",
-                     "validation_span", "validation_from_s", "validation_to_s"});
+  if (const auto known = body.only({"kind",
+                                    "run_id",
+                                    "runs",
+                                    "span",
+                                    "from_s",
+                                    "to_s",
+                                    "channels",
+                                    "structure",
+                                    "cost",
+                                    "fits_offset",
+                                    "dead_time_s",
+                                    "sensor_lag_s",
+                                    "time_limit_s",
+                                    "with_velocity",
+                                    "cut_at_gaps",
+                                    "residuals",
+                                    "validation_run_id",
+                                    "validation_span",
+                                    "validation_from_s",
+                                    "validation_to_s"});
       !known) {
     return std::unexpected{known.error()};
   }
@@ -175,14 +191,20 @@ Result<analysis::IdentifyRequest> identify_request(const Members& body) {
   if (const auto read = read_word(body, "channels", kChannels, request.channels); !read) {
     return std::unexpected{read.error()};
   }
-  const auto with_velocity = body.flag("with_velocity"), residuals = body.flag("residuals");
+  const auto with_velocity = body.flag("with_velocity"), cut_at_gaps = body.flag("cut_at_gaps");
+  const auto residuals = body.flag("residuals");
   if (!with_velocity) return std::unexpected{with_velocity.error()};
+  if (!cut_at_gaps) return std::unexpected{cut_at_gaps.error()};
   if (!residuals) return std::unexpected{residuals.error()};
   request.with_residuals = *residuals;
   if (const auto read = read_search(body, request.search); !read) return std::unexpected{read.error()};
   if (const auto read = read_validation(body, request); !read) return std::unexpected{read.error()};
-  for (analysis::RunPart& part : request.runs) part.window.with_velocity = *with_velocity;
-  if (request.validation) request.validation->window.with_velocity = *with_velocity;
+  const auto complete = [&](analysis::RunWindow& window) {
+    window.with_velocity = *with_velocity;
+    window.cuts_at_gaps = *cut_at_gaps;
+  };
+  for (analysis::RunPart& part : request.runs) complete(part.window);
+  if (request.validation) complete(request.validation->window);
   return request;
 }
 

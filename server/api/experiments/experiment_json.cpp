@@ -24,7 +24,8 @@ json run_json(const storage::ExperimentRun& run) {
           {"steps", json::parse(run.steps, nullptr, false)},
           {"started_at_us", run.started_at_us},
           {"ended_at_us", time_or_null(run.ended_at_us)},
-          {"has_prediction", run.has_prediction}};
+          {"has_prediction", run.has_prediction},
+          {"knowledge", run.knowledge.empty() ? json(nullptr) : json::parse(run.knowledge, nullptr, false)}};
 }
 
 json progress_json(const experiments::ExperimentProgress& progress) {
@@ -82,6 +83,7 @@ json summary_json(const experiments::ExperimentView& view) {
   out["run_counts"] = json::object();
   for (const auto& [state, count] : experiment.run_counts) out["run_counts"][text(state)] = count;
   out["progress"] = view.progress ? progress_json(*view.progress) : json(nullptr);
+  out["activity"] = text_or_null(view.activity);
   return out;
 }
 

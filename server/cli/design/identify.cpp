@@ -49,6 +49,10 @@ void add_source(CLI::App& command, Identify& options) {
       ->needs(run);
   command.add_option("--from-s", options.from_s, "First second of the span to use")->check(finite())->needs(run);
   command.add_option("--to-s", options.to_s, "Last second of the span to use")->check(finite())->needs(run);
+  command
+      .add_flag("--cut-at-gaps", options.cuts_at_gaps,
+                "Of a run with gaps, use the longest part without one; else they are refused")
+      ->needs(run);
   add_word(command, "--channels", options.channels,
            std::array{analysis::ChannelChoice::best, analysis::ChannelChoice::outside, analysis::ChannelChoice::robot},
            "best, outside or robot: whether a position from outside is fitted (default: best, where the run has one)")
@@ -125,7 +129,7 @@ analysis::RunOfMany run_for(const Identify& options, std::size_t index) {
   const RunChoice choice{options.runs[index], options.data_dir};
   analysis::RunWindow window{value_for(options.spans, index), value_for(options.from_s, index).value_or(0),
                              value_for(options.to_s, index).value_or(std::numeric_limits<double>::infinity()),
-                             options.with_velocity};
+                             options.with_velocity, options.cuts_at_gaps};
   const std::vector<storage::StoredSample> samples = read_samples(choice);
   const std::optional<storage::StoredReference> reference = read_reference(choice);
   auto recording = recording_of(samples, window, reference ? &*reference : nullptr, options.channels);

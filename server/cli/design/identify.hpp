@@ -40,6 +40,7 @@ struct Identify {
   std::vector<std::uint32_t> spans;
   std::vector<double> from_s, to_s;
   bool with_velocity = false;
+  bool cuts_at_gaps = false;
   analysis::ChannelChoice channels = analysis::ChannelChoice::best;
   control::IdentificationOptions search;
   bool with_residuals = false;

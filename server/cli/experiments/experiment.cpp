@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/signal_set.hpp>
 #include <cstdio>
@@ -70,6 +71,7 @@ std::string progress_line(const json& experiment) {
     return "waits: " + text_of(experiment.at("waits_for_detail"));
   }
   if (state == "paused") return "paused: " + text_of(experiment.at("detail"));
+  if (!experiment.at("activity").is_null()) return fmt::format("{}: {}", state, text_of(experiment.at("activity")));
   if (progress.is_null()) return state;
   return fmt::format("{}: run {} of {}, step {} of {}, {:.0f} of {:.0f} s", state, progress.at("run").get<int>(),
                      progress.at("runs").get<int>(), progress.at("step").get<int>(), progress.at("steps").get<int>(),
@@ -163,6 +165,27 @@ void write_runs(std::ostream& out, const json& experiment) {
   table.write(out);
 }
 
+// Of an experiment that goes on until something is known: what each run performed, and what was known after it.
+void write_knowledge(std::ostream& out, const json& experiment) {
+  const auto with = [](const json& run) { return !run.at("knowledge").is_null(); };
+  const json& runs = experiment.at("runs");
+  const auto first = std::ranges::find_if(runs, with);
+  if (first == runs.end()) return;
+  const auto parameter = first->at("knowledge").at("parameter").get<std::string>();
+  Table table{{"run", "step", "duty ×", parameter, fmt::format("sigma({})", parameter), "fit (%)", "job"}};
+  for (const json& run : runs) {
+    if (!with(run)) continue;
+    const json &knowledge = run.at("knowledge"), &fit = knowledge.at("fit"), &variant = run.at("variant");
+    const json &sigma = knowledge.at("sigma"), &value = fit.at("parameters").at(parameter);
+    table.row({std::to_string(run.at("number").get<int>()), std::to_string(variant.at("step").get<int>()),
+               cell(variant.at("duty_factor").get<double>()), value.is_null() ? "-" : cell(value.get<double>()),
+               sigma.is_null() ? "-" : cell(sigma.get<double>()), fixed(fit.at("fit_percent").get<double>(), 1),
+               std::to_string(fit.at("job_id").get<std::int64_t>())});
+  }
+  fmt::print(out, "\n");
+  table.write(out);
+}
+
 int write_one(const ExperimentCommand& options, const json& experiment, std::ostream& out) {
   const auto state = experiment.at("state").get<std::string>();
   if (options.json) {
@@ -173,6 +196,7 @@ int write_one(const ExperimentCommand& options, const json& experiment, std::ost
     fmt::print(out, "experiment {} ({}) is {}{}\n", experiment.at("experiment_id").get<std::int64_t>(),
                one_line(experiment.at("name").get<std::string>()), state, why.empty() ? "" : ": " + why);
     if (!experiment.at("runs").empty()) write_runs(out, experiment);
+    write_knowledge(out, experiment);
   }
   return is_over(experiment) && state != "done" ? kExperimentNotDone : 0;
 }

@@ -2,11 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 #include <utility>
 
 #include "server/analysis/control_json.hpp"
-#include "server/experiments/runner/pump_flow.hpp"
 #include "server/storage/experiments/experiment_store.hpp"
 
 namespace server::experiments {
@@ -16,36 +16,23 @@ using nlohmann::json;
 
 namespace {
 
-constexpr microseconds kLook = 200ms, kModelWithin = 30s, kSamplesWithin = 3s;
-constexpr double kWayBack_s = 15;  // for a robot to go back to where its run begins
-
 json json_of(const Variant& variant) {
   return {{"fluid", variant.fluid.empty() ? json(nullptr) : json(variant.fluid)},
           {"controller", variant.controller.empty() ? json(nullptr) : json(variant.controller)},
           {"duty_factor", variant.duty_factor},
           {"setpoint_factor", variant.setpoint_factor},
-          {"repeat", variant.repeat}};
+          {"repeat", variant.repeat},
+          {"step", variant.step == 0 ? json(nullptr) : json(variant.step)}};
 }
 
-std::string steps_json(const Profile& profile, const std::vector<StepBegin>& begins) {
+std::string steps_json(const Profile& profile, std::size_t first_step, const std::vector<StepBegin>& begins) {
   json list = json::array();
   for (const StepBegin& begin : begins) {
-    list.push_back({{"step", begin.step + 1},
+    list.push_back({{"step", first_step + begin.step},
                     {"kind", step_kinds()[static_cast<std::size_t>(profile.steps[begin.step].kind)]},
                     {"robot_time_us", begin.robot_time_us}});
   }
   return list.dump();
-}
-
-// One setpoint, back to 0.
-Profile way_back() {
-  Profile profile;
-  Step step;
-  step.kind = StepKind::setpoint;
-  step.setpoint_m = 0;
-  step.for_s = kWayBack_s;
-  profile.steps = {step};
-  return profile;
 }
 
 }  // namespace
@@ -61,17 +48,50 @@ const station::RobotState& Conduct::robot() const {
 
 asio::awaitable<std::optional<Abort>> Conduct::run() {
   boot_id_ = robot().boot_id;
-  for (const Variant& variant : variants_of(profile_)) {
+  if (profile_.until) until_.emplace(profile_, parts_.fit_of_runs, parts_.maths);
+  while (!abort_) {
+    auto variant = co_await next_run();
+    if (!variant || abort_) break;
     ++number_;
-    co_await one_run(variant);
-    if (abort_) break;
+    co_await one_run(std::move(*variant));
   }
   co_return abort_;
+}
+
+asio::awaitable<std::optional<Variant>> Conduct::next_run() {
+  if (!until_) {
+    const std::vector<Variant> grid = variants_of(profile_);
+    co_return number_ < grid.size() ? std::optional{grid[number_]} : std::nullopt;
+  }
+  std::vector<storage::RunId> runs;
+  for (const storage::ExperimentRun& run : begun_) runs.push_back(run.run.value_or(0));
+  if (!runs.empty()) activity_ = fmt::format("fitting a model to {} of its runs", runs.size());
+  auto is_wanted = [this] { return !abort_.has_value(); };
+  auto next = co_await until_->next(std::move(runs), experiment_.acts_for, model_in_use().model, std::move(is_wanted));
+  activity_.clear();
+  if (!begun_.empty() && !until_->knowledge().is_null()) {
+    current().knowledge = until_->knowledge().dump();
+    auto note = [id = experiment_.id, run = current()](storage::Database& database) {
+      storage::note_knowledge(database, id, run);
+    };
+    co_await parts_.writer.keep("what an experiment knows", std::move(note));
+  }
+  if (!next) {
+    abort({next.error().reason.empty() ? "fit_failed" : next.error().reason, next.error().detail});
+    co_return std::nullopt;
+  }
+  co_return *next;
+}
+
+const Conclusion* Conduct::conclusion() const {
+  return until_ && until_->conclusion() ? &*until_->conclusion() : nullptr;
 }
 
 asio::awaitable<void> Conduct::one_run(Variant variant) {
   co_await prepare(variant);
   if (abort_) co_return;
+  of_run_ = profile_of_run(profile_, variant);
+  first_step_ = std::max<std::size_t>(variant.step, 1);
   auto make = [profile = profile_, variant] { return time_line_of(profile, variant); };
   TimeLine line = co_await parts_.maths.run(std::move(make));
   co_await begin_recording(variant, line);
@@ -88,172 +108,14 @@ asio::awaitable<void> Conduct::end_after_failure() {
   if (!begun_.empty() && !current().ended_at_us) co_await end_recording();
 }
 
-// --- before a run ---
-
-asio::awaitable<void> Conduct::prepare(Variant variant) {
-  co_await await_actor();
-  if (!abort_) take_control();
-  if (!abort_) co_await await_fluid(variant.fluid);
-  if (!abort_ && number_ == 1) co_await await_flow();  // one flow for the whole grid
-  if (!abort_ && !variant.controller.empty()) co_await send_controller(variant.controller);
-  if (!abort_) co_await await_model();
-  if (!abort_) co_await go_to_start();
-}
-
-bool Conduct::is_actor_there() const {
-  const auto seen_us = parts_.driver.station.seen_us(experiment_.acts_for);
-  return seen_us && parts_.driver.clock.steady_us() - *seen_us <= station::kOldestSight.count();
-}
-
-// SAFETY: nothing is prepared, and no control taken, for somebody who is not there; an unattended one goes on alone.
-asio::awaitable<void> Conduct::await_actor() {
-  const std::int64_t ends_us = parts_.driver.clock.steady_us() + kAbsence.count();
-  while (!abort_ && !experiment_.request.is_unattended && !is_actor_there()) {
-    if (parts_.driver.clock.steady_us() > ends_us) {
-      abort({"nobody_present", fmt::format("{} gives no sign of life", experiment_.acts_for)});
-    }
-    co_await changed_.wait_until(parts_.driver.clock, parts_.driver.clock.steady_us() + kLook.count());
-  }
-}
-
-// Paused by somebody while no driver is at work, or until the fluid is another one.
-asio::awaitable<void> Conduct::await_resumption(microseconds limit) {
-  const std::int64_t ends_us = parts_.driver.clock.steady_us() + limit.count();
-  const bool was_paused = waiting_for_.has_value();
-  while (!abort_ && waiting_for_ && !is_resumed_) {
-    if (parts_.driver.clock.steady_us() > ends_us) abort({"paused_too_long", "nobody resumed it"});
-    co_await changed_.wait_until(parts_.driver.clock, parts_.driver.clock.steady_us() + kLook.count());
-  }
-  waiting_for_.reset();
-  if (!abort_ && was_paused) co_await await_actor();
-}
-
-// SAFETY: just before the robot is moved.
-void Conduct::check_robot() {
-  if (abort_) return;
-  if (robot().latched()) return abort({"emergency", "the robot is in emergency"});
-  if (!is_at_rest(robot())) abort({"robot_not_at_rest", "the robot is not in manual at duty 0"});
-}
-
-// For the actor; an unattended one for as long as the robot may be alone.
-void Conduct::take_control() {
-  station::Station& station = parts_.driver.station;
-  if (station.holder(experiment_.request.robot_id) == experiment_.acts_for && !experiment_.request.is_unattended)
-    return;
-  station::ControlRequest request;
-  request.robot_id = experiment_.request.robot_id;
-  request.actor = experiment_.acts_for;
-  request.peer = peer();
-  if (experiment_.request.is_unattended) request.lease = station::kLongestControl;
-  const auto taken = station.control(request);
-  if (!taken) abort({"control_of_another", taken.error().detail});
-}
-
-asio::awaitable<void> Conduct::await_fluid(std::string fluid) {
-  if (!fluid.empty() && robot().fluid.empty()) {  // it says by it which one the robot is in, as a run does
-    const station::Author by{experiment_.acts_for, peer(), parts_.driver.clock.utc_us()};
-    const auto named = parts_.driver.station.set_fluid(experiment_.request.robot_id, fluid, by);
-    if (!named) abort({"fluid", named.error().detail});
-  }
-  const std::int64_t ends_us = parts_.driver.clock.steady_us() + kFluidWithin.count();
-  while (!abort_ && !fluid.empty() && !robot().fluid.empty() && robot().fluid != fluid) {
-    is_resumed_ = false;  // SAFETY: who resumes it does so once the fluid is the right one
-    waiting_for_ =
-        Abort{"fluid", fmt::format("put the robot into '{}', say so, and resume; it is in '{}'", fluid, robot().fluid)};
-    if (parts_.driver.clock.steady_us() > ends_us) abort(*waiting_for_);
-    co_await changed_.wait_until(parts_.driver.clock, parts_.driver.clock.steady_us() + kLook.count());
-  }
-  if (abort_ || !waiting_for_) co_return;
-  co_await await_resumption();
-  boot_id_ = robot().boot_id;  // it may have been switched off meanwhile
-  if (!abort_) take_control();
-}
-
-// SAFETY: the station sets no pump, so nothing moves in a flow that nobody has confirmed; who resumes it confirms it.
-asio::awaitable<void> Conduct::await_flow() {
-  const auto last = co_await parts_.runs.last_flow(experiment_.request.robot_id);
-  auto to_set = flow_to_set(profile_.conditions, last);
-  if (abort_ || !to_set) co_return;
-  is_resumed_ = false;
-  waiting_for_ = Abort{"pump", std::move(*to_set)};
-  co_await await_resumption(kFluidWithin);
-  if (!abort_) take_control();
-}
-
-// The parameters of a model are set at rest only.
-asio::awaitable<void> Conduct::await_model() {
-  const std::int64_t ends_us = parts_.driver.clock.steady_us() + kModelWithin.count();
-  co_await parts_.driver.clock.sleep_for(kLook);  // it begins to be sent a little after the fluid was named
-  while (!abort_ && robot().model.state == station::ModelState::sending) {
-    if (parts_.driver.clock.steady_us() > ends_us) abort({"model", "the model of the fluid did not reach the robot"});
-    co_await changed_.wait_until(parts_.driver.clock, parts_.driver.clock.steady_us() + kLook.count());
-  }
-}
-
-asio::awaitable<std::uint64_t> Conduct::submit(const char* what, protocol::Command command, std::string arguments) {
-  station::CommandRequest request;
-  request.robot_id = experiment_.request.robot_id;
-  request.action = command;
-  request.arguments = std::move(arguments);
-  request.actor = experiment_.acts_for;
-  request.peer = peer();
-  request.takes_control = false;
-  request.until_verified = command.which_action == rheonaut_Command_set_controller_tag;
-  const auto sent = co_await parts_.driver.station.submit(std::move(request));
-  if (sent && was_accepted(sent->state) && (sent->reason.empty() || sent->state == station::CommandState::verified)) {
-    co_return sent->effect_at_robot_us;
-  }
-  const std::string why = sent ? fmt::format("{} {}", text(sent->state), sent->reason) : sent.error().detail;
-  abort({"command_refused", fmt::format("{}: {}", what, why)});
-  co_return 0;
-}
-
-asio::awaitable<void> Conduct::send_controller(std::string name) {
-  const auto controller = co_await parts_.controller_by_name(name, experiment_.request.robot_id);
-  if (!controller) {
-    abort({"controller", fmt::format("controller '{}': {}", name, controller.error().detail)});
-    co_return;
-  }
-  protocol::Command command = rheonaut_Command_init_zero;
-  command.which_action = rheonaut_Command_set_controller_tag;
-  command.action.set_controller = *controller;
-  std::string arguments = json{{"name", name}}.dump();
-  co_await submit("set_controller", command, std::move(arguments));
-}
-
-asio::awaitable<void> Conduct::go_to_start() {
-  const bool goes_back = profile_.conditions.start == StartPosition::back && number_ > 1;
-  if (goes_back) {
-    TimeLine line = time_line_of(way_back(), {});
-    const DriveEnd end = co_await drive(std::move(line));
-    if (end.abort) abort(*end.abort);
-    co_return;
-  }
-  if (profile_.conditions.start == StartPosition::here) co_return;
-  protocol::Command command = rheonaut_Command_init_zero;
-  command.which_action = rheonaut_Command_zero_position_tag;
-  std::string no_arguments = "{}";
-  const std::uint64_t zeroed_at_us = co_await submit("zero_position", command, std::move(no_arguments));
-  co_await await_samples_from(zeroed_at_us);
-}
-
-// Samples of before may still be on their way. A run begins behind them, so that one zero holds for all of it: else no
-// position that was measured from outside could be placed in it.
-asio::awaitable<void> Conduct::await_samples_from(std::uint64_t robot_us) {
-  const std::int64_t ends_us = parts_.driver.clock.steady_us() + kSamplesWithin.count();
-  while (!abort_ && sampled_until_us_ < robot_us) {
-    if (parts_.driver.clock.steady_us() > ends_us) abort({"missing_samples", "no sample of after the zero arrived"});
-    co_await changed_.wait_until(parts_.driver.clock, parts_.driver.clock.steady_us() + kLook.count());
-  }
-}
-
 // --- the run and its prediction ---
 
 storage::RunConditions Conduct::conditions_of(const Variant& variant) const {
   storage::RunConditions conditions;
   const bool is_alone = experiment_.runs_planned == 1;
-  conditions.name =
-      is_alone ? profile_.name : fmt::format("{} ({} of {})", profile_.name, number_, experiment_.runs_planned);
+  conditions.name = is_alone ? profile_.name
+                             : fmt::format("{} ({} of {}{})", profile_.name, number_, until_ ? "at most " : "",
+                                           experiment_.runs_planned);
   conditions.fluid = variant.fluid;
   conditions.pump_profile = pump_flows()[static_cast<std::size_t>(profile_.conditions.pump)];
   conditions.mean_flow_m_s = profile_.conditions.mean_flow_m_s;
@@ -285,26 +147,27 @@ asio::awaitable<void> Conduct::begin_recording(const Variant& variant, const Tim
   co_await parts_.writer.keep("a run of an experiment", std::move(add));
 }
 
+// Of the robot's fluid: the one that robots are sent, or the paper's.
+Conduct::ModelInUse Conduct::model_in_use() const {
+  const bool is_water = robot().fluid == "water";
+  ModelInUse in_use{is_water ? control::kNewtonianModel : control::kNonNewtonianModel, is_water ? "(28)" : "(29)", {}};
+  const station::FluidModel* stored = parts_.fluid_models.in_force().find(robot().fluid);
+  if (stored == nullptr) return in_use;
+  const json document = json::parse(stored->document, nullptr, false);
+  const json plant = document.is_object() ? document.value("plant", json()) : json();
+  const auto model = analysis::model_from(plant);
+  if (!model) return in_use;
+  in_use = {*model, robot().fluid, {}};
+  if (const auto known = analysis::uncertainty_from(plant)) in_use.uncertainty = *known;
+  return in_use;
+}
+
 // On the worker, since a long line takes its time. Empty where it cannot be computed.
 asio::awaitable<std::string> Conduct::predict(const TimeLine& line) {
   const station::RobotSettings* settings = parts_.driver.station.settings(experiment_.request.robot_id);
   if (settings == nullptr || !settings->controller) co_return std::string{};
-  const bool is_water = robot().fluid == "water";
-  PredictionRequest request{profile_,
-                            line,
-                            is_water ? control::kNewtonianModel : control::kNonNewtonianModel,
-                            is_water ? "(28)" : "(29)",
-                            {},
-                            *settings->controller};
-  if (const station::FluidModel* in_use = parts_.fluid_models.in_force().find(robot().fluid)) {
-    const json document = json::parse(in_use->document, nullptr, false);
-    const json plant = document.is_object() ? document.value("plant", json()) : json();
-    if (const auto model = analysis::model_from(plant)) {
-      request.model = *model;
-      request.model_of = robot().fluid;
-      if (const auto known = analysis::uncertainty_from(plant)) request.uncertainty = *known;
-    }
-  }
+  ModelInUse in_use = model_in_use();
+  PredictionRequest request{of_run_, line, in_use.model, in_use.model_of, in_use.uncertainty, *settings->controller};
   auto job = [request = std::move(request)]() -> std::string {
     try {
       return prediction_json(request);
@@ -332,7 +195,7 @@ asio::awaitable<DriveEnd> Conduct::drive(TimeLine line) {
 
 asio::awaitable<void> Conduct::end_recording() {
   storage::ExperimentRun& run = current();
-  run.steps = steps_json(profile_, begins_);
+  run.steps = steps_json(of_run_, first_step_, begins_);
   run.state = abort_ ? storage::ExperimentState::aborted : storage::ExperimentState::done;
   run.reason = abort_ ? abort_->reason : "";
   std::string verdict = abort_ ? fmt::format("aborted: {}", abort_->detail) : "done";

@@ -2,6 +2,8 @@
 //
 //   for each run: fluid, flow → controller → model on the robot → beginning of the run → time line → end of the run
 //
+// The runs are those of the profile's grid, or, with `until`, chosen one after another (until_known.hpp).
+//
 // Each run and its prediction is on disk before the robot moves. What cannot be prepared is a reason to pause (a person
 // must change the fluid, or set the pump) or to abort. Loop thread; all that it is given outlives it, and it outlives
 // the loop's run() or its own run().
@@ -14,6 +16,7 @@
 #include <string>
 #include <vector>
 
+#include "server/experiments/adaptive/until_known.hpp"
 #include "server/experiments/runner/prediction.hpp"
 #include "server/experiments/runner/run_driver.hpp"
 #include "server/experiments/runner/stubborn_writer.hpp"
@@ -36,6 +39,7 @@ struct ConductParts {
   StubbornWriter& writer;
   runtime::WorkerThread& maths;
   const ControllerByName& controller_by_name;
+  const FitOfRuns& fit_of_runs;
 };
 
 class Conduct {
@@ -57,12 +61,21 @@ class Conduct {
   void on_command(const station::CommandRecord& record);
 
   bool is_aborting() const { return abort_.has_value(); }
-  const Abort* pause_reason() const;  // null: it is not paused
+  const Abort* pause_reason() const;     // null: it is not paused
+  const Conclusion* conclusion() const;  // of one with until that was not aborted: how it ended; else null
+  const std::string& activity() const { return activity_; }  // while no run is under way, in words; or empty
   const RunDriver* driver() const { return driver_.get(); }
   std::uint32_t number() const { return number_; }  // of the run, from 1
   const std::vector<storage::ExperimentRun>& runs() const { return begun_; }
 
  private:
+  struct ModelInUse {
+    control::FractionalModel model;
+    std::string model_of;  // "(28)", or the fluid
+    std::optional<control::ExpectedUncertainty> uncertainty;
+  };
+
+  boost::asio::awaitable<std::optional<Variant>> next_run();  // none: there is no more
   boost::asio::awaitable<void> one_run(Variant variant);
   boost::asio::awaitable<void> prepare(Variant variant);
   boost::asio::awaitable<void> await_fluid(std::string fluid);
@@ -80,6 +93,7 @@ class Conduct {
   // The robot time at which it acts; aborts if it is refused.
   boost::asio::awaitable<std::uint64_t> submit(const char* what, protocol::Command command, std::string arguments);
   storage::RunConditions conditions_of(const Variant& variant) const;
+  ModelInUse model_in_use() const;
   void take_control();
   void check_robot();
   bool is_actor_there() const;
@@ -90,6 +104,10 @@ class Conduct {
   const ConductParts parts_;
   storage::Experiment experiment_;
   Profile profile_;
+  std::optional<UntilKnown> until_;  // of a profile with it
+  Profile of_run_;                   // the present run's part of the profile, from this step on
+  std::size_t first_step_ = 1;
+  std::string activity_;
   std::unique_ptr<RunDriver> driver_;  // null: none is at work
   std::optional<Abort> abort_;
   std::optional<Abort> waiting_for_;  // paused while no driver is at work

@@ -38,6 +38,11 @@ Result<Experiments::Prepared> Experiments::prepare(const std::string& document, 
     prepared.profile = parse_profile(document, "profile");
     if (auto allowed = check_limits(prepared.profile, envelope, fluid); !allowed)
       return std::unexpected{allowed.error()};
+    if (prepared.profile.until) {
+      prepared.runs = static_cast<std::uint32_t>(prepared.profile.most_runs);
+      prepared.duration_s = prepared.runs * longest_duration_s(prepared.profile);
+      return prepared;  // it has no auto
+    }
     for (const Variant& variant : variants_of(prepared.profile)) {
       ++prepared.runs;
       if (variant.repeat == 1)

@@ -144,8 +144,8 @@ void Experiments::begin_what_may() {
 asio::awaitable<void> Experiments::carry_out(ExperimentId id) {
   Entry& entry = entries_.at(id);
   entry.waits_for.clear();
-  const ConductParts conduct_parts{parts_,  recording_.runs, recording_.fluid_models,
-                                   writer_, maths_,          controller_by_name_};
+  const ConductParts conduct_parts{
+      parts_, recording_.runs, recording_.fluid_models, writer_, maths_, controller_by_name_, fit_of_runs_};
   entry.experiment.started_at_us = parts_.clock.utc_us();
   entry.experiment.state = ExperimentState::running;
   entry.experiment.reason.clear();
@@ -176,8 +176,9 @@ asio::awaitable<void> Experiments::conduct(Entry& entry) {
 asio::awaitable<void> Experiments::finish(Entry& entry) {
   Experiment& experiment = entry.experiment;
   experiment.state = entry.end ? ExperimentState::aborted : ExperimentState::done;
-  experiment.reason = entry.end ? entry.end->reason : "";
-  experiment.detail = entry.end ? entry.end->detail : "";
+  const Conclusion* conclusion = entry.conduct->conclusion();
+  experiment.reason = entry.end ? entry.end->reason : conclusion ? conclusion->reason : "";
+  experiment.detail = entry.end ? entry.end->detail : conclusion ? conclusion->detail : "";
   experiment.ended_at_us = parts_.clock.utc_us();
   const station::Author by{experiment.acts_for, fmt::format("experiment:{}", experiment.id), *experiment.ended_at_us};
   // Its control was taken for longer than a sign of life lasts; who commands the robot by now keeps it.
@@ -273,7 +274,8 @@ ExperimentView Experiments::view_of(const Entry& entry) const {
 }
 
 ExperimentView Experiments::summary_of(const Entry& entry) const {
-  ExperimentView view{entry.experiment, entry.waits_for, entry.waits_for_detail, std::nullopt};
+  ExperimentView view{entry.experiment, entry.waits_for, entry.waits_for_detail, std::nullopt,
+                      entry.conduct ? entry.conduct->activity() : ""};
   view.experiment.state = state_of(entry);
   if (!entry.conduct) return view;
   view.experiment.run_counts = storage::counts_of(entry.conduct->runs());

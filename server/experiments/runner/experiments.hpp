@@ -38,6 +38,7 @@ struct ExperimentView {
   std::string waits_for;  // of a waiting one, for programs: nobody_present, robot_not_at_rest, …; empty: its turn
   std::string waits_for_detail;
   std::optional<ExperimentProgress> progress;  // of one that runs
+  std::string activity{};                      // what is done between two runs, in words; or empty
 };
 
 class Experiments final : public station::StationSink {
@@ -48,6 +49,7 @@ class Experiments final : public station::StationSink {
   ~Experiments() override;
 
   void set_controller_by_name(ControllerByName by_name) { controller_by_name_ = std::move(by_name); }
+  void set_fit_of_runs(FitOfRuns fit) { fit_of_runs_ = std::move(fit); }
   using OnChange = std::function<void(const ExperimentView& summary)>;
   void set_on_change(OnChange on_change) { on_change_ = std::move(on_change); }  // and once a second while one runs
 
@@ -138,6 +140,7 @@ class Experiments final : public station::StationSink {
   const bool allow_unattended_;
   StubbornWriter writer_;
   ControllerByName controller_by_name_;
+  FitOfRuns fit_of_runs_;
   OnChange on_change_ = [](const ExperimentView&) {};
   std::map<storage::ExperimentId, Entry> entries_;             // that have not ended
   std::map<station::RobotId, storage::ExperimentId> running_;  // of each robot at most one

@@ -45,7 +45,8 @@ Result<void> check_limits(const Profile& profile, const config::Envelope& envelo
     const config::CommandLimits& limits = envelope.in(variant.fluid.empty() ? fluid_of_robot : variant.fluid);
     double setpoint_m = 0;
     const TimeLine line = time_line_of(profile, variant);
-    for (const Action& action : line.actions) {
+    for (Action action : line.actions) {
+      if (variant.step > 0) action.step = variant.step - 1;
       if (auto allowed = check_action(action, limits, setpoint_m); !allowed) return allowed;
     }
   }

@@ -45,6 +45,7 @@ struct ExperimentRun {
   std::string reason;              // as of Experiment
   std::string variant = "{}";      // JSON: fluid, controller, factors, repeat
   std::string steps = "[]";        // JSON: when each step began, in the time of the robot
+  std::string knowledge;           // JSON: what the fit after it knew, with `until`; empty: nothing
   std::int64_t started_at_us = 0;  // UTC, as the next
   std::optional<std::int64_t> ended_at_us;
   bool has_prediction = false;

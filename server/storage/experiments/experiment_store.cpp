@@ -39,9 +39,10 @@ Experiment experiment_of(SQLite::Statement& row) {
 }
 
 void read_experiment_runs(SQLite::Database& database, Experiment& experiment) {
-  SQLite::Statement rows{database,
-                         "SELECT number, state, run_id, reason, variant, steps, started_at_us, ended_at_us,"
-                         " prediction IS NOT NULL FROM experiment_run WHERE experiment_id = ? ORDER BY number"};
+  SQLite::Statement rows{
+      database,
+      "SELECT number, state, run_id, reason, variant, steps, started_at_us, ended_at_us,"
+      " prediction IS NOT NULL, coalesce(knowledge, '') FROM experiment_run WHERE experiment_id = ? ORDER BY number"};
   bind_all(rows, experiment.id);
   while (rows.executeStep()) {
     ExperimentRun run;
@@ -54,6 +55,7 @@ void read_experiment_runs(SQLite::Database& database, Experiment& experiment) {
     run.started_at_us = rows.getColumn(6).getInt64();
     run.ended_at_us = time_or_none(rows.getColumn(7));
     run.has_prediction = rows.getColumn(8).getInt() != 0;
+    run.knowledge = rows.getColumn(9).getString();
     experiment.runs.push_back(std::move(run));
   }
   experiment.run_counts = counts_of(experiment.runs);
@@ -134,6 +136,12 @@ void end_experiment_run(Database& database, ExperimentId id, const ExperimentRun
                         "UPDATE experiment_run SET state = ?, reason = ?, steps = ?, ended_at_us = ?"
                         " WHERE experiment_id = ? AND number = ?"};
   execute(end, text(run.state), run.reason, run.steps, run.ended_at_us, id, run.number);
+}
+
+void note_knowledge(Database& database, ExperimentId id, const ExperimentRun& run) {
+  SQLite::Statement note{database.handle(),
+                         "UPDATE experiment_run SET knowledge = ? WHERE experiment_id = ? AND number = ?"};
+  execute(note, run.knowledge, id, run.number);
 }
 
 std::vector<station::RobotId> interrupt_experiments(Database& database, std::int64_t utc_us) {

@@ -26,6 +26,7 @@ void store_experiment(Database& database, const Experiment& experiment,
 // A run that has begun, with its prediction (JSON, empty: none); and how it ended.
 void add_experiment_run(Database& database, ExperimentId id, const ExperimentRun& run, const std::string& prediction);
 void end_experiment_run(Database& database, ExperimentId id, const ExperimentRun& run);
+void note_knowledge(Database& database, ExperimentId id, const ExperimentRun& run);  // its knowledge
 
 // SAFETY: after a restart of the station nothing goes on by itself: what had begun is interrupted, what waited is held.
 // Returns the robots whose experiment was interrupted, by this restart or an earlier one, and that have not been seen

@@ -36,6 +36,24 @@ double amplitude_at(const std::vector<double>& signal, double frequency_hz) {
   return 2 * std::abs(sum) / static_cast<double>(signal.size());
 }
 
+// At its end the next step begins: a second duty for the same tick would be refused by the robot.
+TEST(DutySignals, NothingChangesAtTheEndOfAStep) {
+  Step step = step_of(StepKind::prbs, 0);
+  step.amplitude = 0.6;
+  step.bit_s = 0.2;
+  step.every_s = 0.2;
+  step.from_duty = step.from_hz = 0.1;
+  step.to_duty = step.to_hz = 0.5;
+  for (const StepKind kind :
+       {StepKind::prbs, StepKind::chirp, StepKind::multisine, StepKind::ramp, StepKind::staircase}) {
+    step.kind = kind;
+    for (int bits = 60; bits < 90; ++bits) {
+      step.for_s = 0.2 * bits;
+      EXPECT_LT(duty_changes(step).back().tick, ticks_of(step)) << step_kinds()[static_cast<std::size_t>(kind)] << bits;
+    }
+  }
+}
+
 TEST(DutySignals, AStaircaseHasItsLevelsForEqualTimes) {
   Step step = step_of(StepKind::staircase, 3);
   step.from_duty = -0.2;

@@ -29,6 +29,44 @@ std::string error_of(const std::string& text) {
   }
 }
 
+constexpr const char* kUntil = "until = \"sigma(alpha) <= 0.02\"\n";
+constexpr const char* kDuty = "[[step]]\nkind = \"duty\"\nduty = 0.4\nfor_s = 3\n";
+constexpr const char* kLonger = "[[step]]\nkind = \"duty\"\nduty = 0.2\nfor_s = 5\n";
+
+TEST(Profile, WithUntilItsStepsAreAChoice) {
+  const std::string text =
+      std::string{kHead} + kUntil + "most_runs = 3\n[sweep]\nduty_factor = [1, -0.5]\n" + kDuty + kLonger;
+  const Profile profile = parse_profile(text, "mine.toml");
+  ASSERT_TRUE(profile.until);
+  EXPECT_EQ(profile.until->parameter, 3U);
+  EXPECT_EQ(profile.until->sigma, 0.02);
+  EXPECT_EQ(profile.most_runs, 3U);
+  const std::vector<Variant> choices = variants_of(profile);
+  ASSERT_EQ(choices.size(), 4U);
+  EXPECT_EQ(choices[3].step, 2U);
+  const TimeLine line = time_line_of(profile, choices[3]);
+  EXPECT_EQ(line.step_begins.size(), 1U);
+  EXPECT_EQ(line.actions.front().value, -0.1);
+  EXPECT_DOUBLE_EQ(line.duration_s(), 5);
+  EXPECT_DOUBLE_EQ(longest_duration_s(profile), 5) << "a run performs one of them";
+}
+
+TEST(Profile, AnUntilThatCannotBeIsRefused) {
+  const std::string target = "until = \"sigma(gamma) <= 0.02\"\n";
+  EXPECT_THAT(error_of(target + kDuty), HasSubstr("it must be like sigma(alpha) <= 0.02"));
+  for (const char* sigma : {"0", "-1", "inf", "0.02 ", "", "1e999"}) {
+    EXPECT_THAT(error_of(std::string{"until = \"sigma(alpha) <= "} + sigma + "\"\n" + kDuty),
+                HasSubstr("it must be like"))
+        << sigma;
+  }
+  EXPECT_THAT(error_of(std::string{kUntil} + "most_runs = 9\n" + kDuty), HasSubstr("most_runs"));
+  EXPECT_THAT(error_of(std::string{kUntil} + "[sweep]\nrepeats = 2\n" + kDuty), HasSubstr("duty_factor only"));
+  EXPECT_THAT(error_of(std::string{kUntil} + "[[step]]\nkind = \"rest\"\nfor_s = 3\n"),
+              AllOf(HasSubstr("mine.toml:5"), HasSubstr("kind is rest"), HasSubstr("prbs")));
+  EXPECT_THAT(error_of(std::string{kUntil} + "[[step]]\nkind = \"setpoint\"\nsetpoint_m = 0.1\nfor_s = 3\n"),
+              HasSubstr("kind is setpoint"));
+}
+
 TEST(Profile, HasWhatItsDocumentSays) {
   const Profile profile = parse_profile(R"(
 name = "Mine"
@@ -141,7 +179,7 @@ TEST(Profile, TheDocumentOfThreeTonesIsSoundAtEveryCrossover) {
 }
 
 TEST(Profile, ThoseOfTheProgramAreSound) {
-  ASSERT_EQ(shipped_profiles().size(), 8U);
+  ASSERT_EQ(shipped_profiles().size(), 9U);
   for (const base::EmbeddedFile& shipped : shipped_profiles()) {
     const Profile profile = find_profile(std::string(shipped.name));
     EXPECT_FALSE(variants_of(profile).empty()) << shipped.name;

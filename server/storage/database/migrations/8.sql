@@ -99,9 +99,10 @@ CREATE TABLE experiment_run (
   state TEXT NOT NULL,                      -- running, done, aborted, interrupted
   run_id INTEGER,                           -- NULL: it did not come to one
   reason TEXT NOT NULL DEFAULT '',          -- as of the experiment
-  variant TEXT NOT NULL,                    -- JSON: fluid, controller, factors, repeat
+  variant TEXT NOT NULL,                    -- JSON: fluid, controller, factors, repeat, step
   steps TEXT NOT NULL,                      -- JSON: when each step began, in the time of the robot
   prediction TEXT,                          -- JSON: what the model in use predicted; NULL: nothing
+  knowledge TEXT,                           -- JSON: what the fit of the runs up to it knew; NULL: there was none
   started_at_us INTEGER NOT NULL,
   ended_at_us INTEGER,                      -- NULL: it has not ended
   PRIMARY KEY (experiment_id, number)

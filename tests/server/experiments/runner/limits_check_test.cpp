@@ -6,6 +6,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "server/experiments/preview.hpp"
 #include "server/experiments/profile_document.hpp"
 #include "server/experiments/runner/order_arguments.hpp"
 #include "server/experiments/runner/prediction.hpp"

@@ -1,0 +1,68 @@
+#include "server/api/experiments/fit_of_runs.hpp"
+
+#include <fmt/format.h>
+
+#include "server/analysis/identify_job.hpp"
+#include "server/api/bodies/job_body.hpp"
+#include "server/experiments/runner/experiments.hpp"
+#include "server/storage/jobs/jobs.hpp"
+
+namespace server::api {
+namespace asio = boost::asio;
+using namespace std::chrono_literals;
+using experiments::FitRequest;
+using experiments::FittedModel;
+using nlohmann::json;
+
+namespace {
+
+constexpr double kSearchFor_s = 60;
+constexpr microseconds kLook = 200ms;
+
+asio::awaitable<Result<storage::Job>> await_job(FitParts parts, storage::JobId id, FitRequest request) {
+  for (;;) {
+    const auto job = co_await parts.jobs.wait_for(id, kLook);
+    if (!job || has_ended(job->state)) co_return job;
+    if (!request.is_wanted()) static_cast<void>(co_await parts.jobs.cancel(id));
+  }
+}
+
+asio::awaitable<Result<FittedModel>> fit(FitParts parts, FitRequest request) {
+  auto body = parse_job(fit_body(request));
+  if (!body) co_return std::unexpected{body.error()};
+  auto identify = std::get<analysis::IdentifyRequest>(std::move(body->request));
+  auto work = [&analysis = parts.analysis, identify = std::move(identify)](storage::JobRun& job) {
+    return analysis::identify_job(analysis, identify, std::nullopt, job);
+  };
+  storage::JobRequest wanted{body->kind, body->document, request.actor};
+  const auto begun = co_await parts.jobs.begin(std::move(wanted), std::move(work));
+  if (!begun) co_return std::unexpected{begun.error()};
+  const auto ended = co_await await_job(parts, begun->id, std::move(request));
+  if (!ended) co_return std::unexpected{ended.error()};
+  if (ended->state != storage::JobState::done) {
+    const std::string why = ended->error.empty() ? text(ended->state) : ended->error;
+    co_return fail(ErrorCode::conflict, fmt::format("the fit, job {}: {}", ended->id, why), "fit_failed");
+  }
+  const auto result = co_await parts.jobs.result(ended->id);
+  co_return experiments::fitted_model_from(ended->id, json::parse(result.value_or(""), nullptr, false));
+}
+
+}  // namespace
+
+// The robot's own record, since a position from outside comes after the experiment.
+std::string fit_body(const FitRequest& request) {
+  json body = {{"kind", "identify"}, {"channels", "robot"}, {"cut_at_gaps", true}, {"time_limit_s", kSearchFor_s}};
+  if (request.is_fractional) body["structure"] = "fractional";
+  if (request.runs.size() == 1) {
+    body["run_id"] = request.runs.front();
+  } else {
+    for (const storage::RunId run : request.runs) body["runs"].push_back({{"run_id", run}});
+  }
+  return body.dump();
+}
+
+void connect_fits(experiments::Experiments& experiments, FitParts parts) {
+  experiments.set_fit_of_runs([parts](FitRequest request) { return fit(parts, std::move(request)); });
+}
+
+}  // namespace server::api

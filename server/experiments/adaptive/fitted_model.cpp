@@ -1,0 +1,44 @@
+#include "server/experiments/adaptive/fitted_model.hpp"
+
+#include "server/analysis/control_json.hpp"
+
+namespace server::experiments {
+using nlohmann::json;
+
+Result<FittedModel> fitted_model_from(storage::JobId job, const json& result) {
+  try {
+    FittedModel fitted;
+    fitted.job = job;
+    if (!result.at("residual_sd").is_number()) return fail(ErrorCode::invalid, "no model fits the runs", "no_model");
+    const auto model = analysis::model_from(result.at("parameters"));
+    if (!model) return std::unexpected{model.error()};
+    fitted.model = *model;
+    for (std::size_t i = 0; i < control::kParameters; ++i) {
+      const json& sigma = result.at("one_sigma").at(control::kParameterNames[i]);
+      if (sigma.is_number()) fitted.one_sigma[i] = sigma.get<double>();
+    }
+    fitted.residual_sd = result.at("residual_sd").get<double>();
+    fitted.fit_percent = result.at("fit_percent").get<double>();
+    const json& of_channels = result.contains("runs") ? result.at("runs").at(0) : result;
+    fitted.is_of_acceleration = of_channels.at("channels").at(0) == "acceleration_m_s2";
+    fitted.warnings = result.at("warnings").get<std::vector<std::string>>();
+    return fitted;
+  } catch (const json::exception& error) {
+    return fail(ErrorCode::invalid, std::string{"the result of the fit cannot be read: "} + error.what(), "no_model");
+  }
+}
+
+json to_json(const FittedModel& fitted) {
+  json sigma = json::object();
+  for (std::size_t i = 0; i < control::kParameters; ++i) {
+    sigma[control::kParameterNames[i]] = fitted.one_sigma[i] ? json(*fitted.one_sigma[i]) : json(nullptr);
+  }
+  return {{"job_id", fitted.job},
+          {"parameters", json(analysis::json_of(fitted.model))},
+          {"one_sigma", std::move(sigma)},
+          {"fit_percent", fitted.fit_percent},
+          {"residual_sd", fitted.residual_sd},
+          {"warnings", fitted.warnings}};
+}
+
+}  // namespace server::experiments
