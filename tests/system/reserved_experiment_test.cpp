@@ -79,6 +79,7 @@ TEST_F(ReservedExperimentTest, InTheSlotOfSomebodyElseTheRobotIsBroughtToRestByT
     clock.run_for(2s);
     ASSERT_NE(duty(), 0);
     reserve("boris", 0s, 20s);
+    EXPECT_EQ(view(id).experiment.state, ExperimentState::aborting) << "at once";
     EXPECT_EQ(command_by("anna", sim_robot::set_setpoint(0.2F)).error().reason, "reserved");
     ASSERT_TRUE(clock.run_until([&] { return duty() == 0 && state().context.mode == rheonaut_MODE_MANUAL; }, 2s));
     expect_aborted(id, "reserved");

@@ -202,8 +202,9 @@ TEST_F(AuthorityTest, AnAdministratorsForceHoldsInASlotUntilItsLeaseEnds) {
   EXPECT_EQ(reason(authority_.use("r1", "user:root/session:3")), "reserved")
       << "another page of theirs has not forced it";
   clock_.run_for(3s);
-  EXPECT_EQ(authority_.expire().at(0).kind, "control_expired");
   EXPECT_EQ(reason(authority_.take("r1", "user:root/session:2", 3s)), "reserved") << "once it has ended";
+  EXPECT_EQ(authority_.expire().at(0).kind, "control_expired");
+  EXPECT_EQ(reason(authority_.take("r1", "user:root/session:2", 3s)), "reserved");
 }
 
 TEST_F(AuthorityTest, WhatIsHandedOverAfterAForceIsNoForce) {
