@@ -40,7 +40,7 @@ static int serve(const config::Config& config) {
   recording.runs.set_station_document(station_document(config));
   station.add_sink(live);
   const storage::RestoredState restored = runtime::run_first(loop, recording.open());
-  station.restore(restored.robots, restored.pending_stops);
+  station.restore(restored.robots, restored.pending_stops, restored.reservations);
   // In: robots arrive here; each session becomes the station's RobotLink. Robots are sent the model of their fluid.
   const auto at = config::parse_endpoint(config.robots);
   link::RobotListener robots{

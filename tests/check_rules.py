@@ -34,8 +34,8 @@ sim_robot/client sim_robot/fleet sim_robot/proxy sim_robot/cli
 server/runtime server/config server/tls server/net
 server/station/state server/station/commands server/station server/station/models server/link server/live
 server/storage/database server/storage/audit server/storage/samples server/storage/commits server/storage/ingest
-server/storage/runs server/storage/jobs server/storage/designs server/storage/experiments server/storage/query
-server/storage/export server/storage/upkeep server/storage
+server/storage/runs server/storage/jobs server/storage/designs server/storage/experiments server/storage/reservations
+server/storage/query server/storage/export server/storage/upkeep server/storage
 server/analysis/metrics server/analysis/comparison server/analysis/report server/analysis/capsule server/analysis server/analysis/tuning
 server/analysis/documents server/experiments server/experiments/adaptive server/experiments/runner server/identity server/http
 server/api/bodies server/api/routes server/api/analysis server/api/experiments server/api server/cli/terminal server/cli/design

@@ -75,6 +75,8 @@ void ApiServer::add_routes(boost::asio::io_context& loop, station::Station& stat
   add_station_routes(router_, {auth_, clock_, recording.head_watch, recording.recorder, facts_});
   add_recording_routes(router_, {clock_, recording, station, *facts_.security, tasks_.exceptions()});
   add_robot_routes(router_, {loop, history, station, texts_});
+  station.set_account_of([this](const std::string& actor) { return accounts_.account_of(actor); });
+  add_reservation_routes(router_, {accounts_, clock_, recording.reservations, station});
   add_command_routes(router_, {clock_, history, station});
   add_in_force_routes(router_, {station});
   add_fluid_routes(router_, {clock_, recording.fluid_models, recording.recorder, station});

@@ -231,6 +231,27 @@ asio::awaitable<Result<void>> Accounts::remove_user(std::string name, station::A
   co_return Result<void>{};
 }
 
+std::string Accounts::account_of(const std::string& actor) const {
+  constexpr std::string_view kUser = "user:", kToken = "token:";
+  if (actor.starts_with(kUser)) return actor.substr(0, actor.find('/'));
+  if (!actor.starts_with(kToken)) return actor;
+  // No two tokens have had the same name.
+  const auto found = std::ranges::find(tokens_, actor.substr(kToken.size()), &Token::name);
+  return found == tokens_.end() || found->owner.empty() ? actor : fmt::format("{}{}", kUser, found->owner);
+}
+
+bool Accounts::is_account(const std::string& account) const {
+  const auto is_page = [&account](const Sessions::Open& open) { return actor_of(open.user, open.number) == account; };
+  const auto is_script = [&account](const Token& known) {
+    return known.owner.empty() && known.revoked_at_us == 0 && account == "token:" + known.name;
+  };
+  const auto is_user = [&account](const auto& user) {
+    return !user.second.disabled && "user:" + user.first == account;
+  };
+  return account == "token:local" || std::ranges::any_of(users_, is_user) || std::ranges::any_of(tokens_, is_script) ||
+         std::ranges::any_of(sessions_.all(), is_page);
+}
+
 std::vector<ApiToken> Accounts::tokens() const { return {tokens_.begin(), tokens_.end()}; }
 
 asio::awaitable<Result<NewToken>> Accounts::add_token(TokenRequest request, station::Author by) {

@@ -66,6 +66,10 @@ class Accounts {
   boost::asio::awaitable<Result<User>> change_user(std::string name, UserChange change, station::Author by);
   boost::asio::awaitable<Result<void>> remove_user(std::string name, station::Author by);
 
+  // Whose an actor is: a token of a user is theirs ("user:anna"), a page as well; else the actor itself.
+  std::string account_of(const std::string& actor) const;
+  bool is_account(const std::string& account) const;  // somebody may sign in as, or use, it now
+
   std::vector<ApiToken> tokens() const;
   boost::asio::awaitable<Result<NewToken>> add_token(TokenRequest request, station::Author by);
   boost::asio::awaitable<Result<ApiToken>> revoke_token(std::string name, station::Author by);

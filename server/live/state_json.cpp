@@ -77,6 +77,19 @@ json to_json(const station::ControlState& control) {
           {"wished_by", control.requested_by.empty() ? json(nullptr) : json(control.requested_by)}};
 }
 
+json to_json(const station::Reservation& reservation) {
+  return {{"reservation_id", reservation.id},
+          {"robot_id", reservation.robot_id},
+          {"holder", reservation.holder},
+          {"from_us", reservation.from_us},
+          {"until_us", reservation.until_us},
+          {"purpose", reservation.purpose},
+          {"made_by", reservation.made_by},
+          {"made_at_us", reservation.made_at_us},
+          {"cancelled_at_us", time_or_null(reservation.cancelled_at_us)},
+          {"cancelled_by", reservation.cancelled_by.empty() ? json(nullptr) : json(reservation.cancelled_by)}};
+}
+
 json to_json(const station::ChangedLimit& limit) {
   return {{"name", limit.name},
           {"unit", limit.unit},
@@ -125,6 +138,7 @@ json to_json(const station::RobotState& robot) {
   out["unknown_values"] =
       object_or_null(station::UnknownValues{}.add("reset_cause", robot.reset_cause).add_fields_of(context).text());
   out["control"] = robot.control.holder.empty() ? json(nullptr) : to_json(robot.control);
+  out["reservation"] = robot.reservation ? to_json(*robot.reservation) : json(nullptr);
   return out;
 }
 

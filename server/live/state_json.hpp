@@ -19,6 +19,7 @@ nlohmann::json to_json(const station::RobotState& robot);
 nlohmann::json to_json(const station::Sample& sample);
 nlohmann::json to_json(const station::CommandRecord& record);
 nlohmann::json to_json(const station::ControlState& control);
+nlohmann::json to_json(const station::Reservation& reservation);
 nlohmann::json to_json(const station::ChangedLimit& limit);
 nlohmann::json to_json(const station::RobotEvent& event);
 

@@ -1,4 +1,5 @@
-// Decides who may command which robot, by the leases of Authority and by the age of the state that the request saw.
+// Decides who may command which robot: by the leases of Authority, by the reservations, and by the age of the state
+// that the request saw.
 //
 // Emergency stops are never checked here. Publishes nothing: changes are returned. Loop thread.
 #pragma once
@@ -17,14 +18,20 @@ const char* text(ControlAction action);
 
 class CommandAuthority {
  public:
-  explicit CommandAuthority(runtime::Clock& clock) : authority_{clock}, presence_{clock} {}
+  explicit CommandAuthority(runtime::Clock& clock) : authority_{clock, reservations_}, presence_{clock} {}
 
   ControlState of(const RobotId& robot) const { return authority_.of(robot); }
   Result<void> may_use(const RobotId& robot, const std::string& actor) const {
     return authority_.may_use(robot, actor);
   }
 
-  // conflict when the command needs control of the robot and another has it.
+  const Reservations& reservations() const { return reservations_; }
+  Reservations& reservations() { return reservations_; }
+  const Reservation* keeps_out(const RobotId& robot, const std::string& actor, microseconds ahead) const {
+    return authority_.keeps_out(robot, actor, ahead);
+  }
+
+  // conflict when the command needs control of the robot and another has it, or has reserved the robot.
   Result<void> may_command(const CommandRequest& request) const;
   // conflict when what its page saw was too old for what the command would do.
   Result<void> check_sight(const CommandRequest& request) const;
@@ -39,6 +46,7 @@ class CommandAuthority {
   std::vector<Authority::Change> expire() { return authority_.expire(); }
 
  private:
+  Reservations reservations_;
   Authority authority_;
   Presence presence_;
 };

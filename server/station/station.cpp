@@ -32,7 +32,8 @@ Station::~Station() = default;
 
 void Station::add_sink(StationSink& sink) { parts_->notifier.add(sink); }
 
-void Station::restore(const std::vector<RestoredRobot>& robots, const std::vector<CommandRecord>& pending_stops) {
+void Station::restore(const std::vector<RestoredRobot>& robots, const std::vector<CommandRecord>& pending_stops,
+                      const std::vector<Reservation>& reservations) {
   for (const RestoredRobot& restored : robots) {
     RobotState& robot = parts_->robots.add(restored.id).robot;
     robot.boot_id = restored.boot_id;
@@ -43,6 +44,7 @@ void Station::restore(const std::vector<RestoredRobot>& robots, const std::vecto
   for (const CommandRecord& record : pending_stops) {
     parts_->stops.restore(parts_->robots.add(record.robot_id), record);
   }
+  for (const Reservation& reservation : reservations) parts_->control.reservations().add(reservation);
 }
 
 const std::map<RobotId, RobotState>& Station::robots() const { return parts_->robots.states(); }

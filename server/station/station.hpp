@@ -21,6 +21,7 @@
 #include "server/runtime/clock.hpp"
 #include "server/runtime/result.hpp"
 #include "server/station/commands/requests.hpp"
+#include "server/station/commands/reservations.hpp"
 #include "server/station/state/audit_note.hpp"
 #include "server/station/state/checked.hpp"
 #include "server/station/state/clock_sync.hpp"
@@ -43,8 +44,9 @@ class Station {
   void add_sink(StationSink& sink);
 
   // What the archive knows, before those robots arrive: its robots, shown as disconnected and latched as they were, and
-  // the emergency stops of an earlier run of the station that no robot has acknowledged.
-  void restore(const std::vector<RestoredRobot>& robots, const std::vector<CommandRecord>& pending_stops);
+  // the emergency stops of an earlier run of the station that no robot has acknowledged; and the reservations.
+  void restore(const std::vector<RestoredRobot>& robots, const std::vector<CommandRecord>& pending_stops,
+               const std::vector<Reservation>& reservations = {});
 
   const std::map<RobotId, RobotState>& robots() const;
   const RobotState* find(const RobotId& id) const;
@@ -74,6 +76,19 @@ class Station {
   std::optional<std::int64_t> seen_us(const std::string& actor) const;
   std::string holder(const RobotId& id) const;   // of control, now; empty: nobody
   boost::asio::awaitable<void> watch_control();  // reports when control has ended, until cancelled
+
+  // Whether the reservation may be made: what Reservations::check says. conflict, too: somebody is in control of the
+  // robot whom it would keep out within kReservationNotice, and no administrator makes it.
+  Result<void> check_reservation(const Reservation& wanted, bool is_by_admin) const;
+  // It is on disk, and in force from now on; or it is no longer.
+  void add_reservation(const Reservation& made);
+  void remove_reservation(ReservationId id, const std::string& cancelled_by);
+  const Reservation* find_reservation(ReservationId id) const;  // that is not over; null: none
+  // The first one that keeps the actor out of the robot between now and so much later; null: none, or they control the
+  // robot by force. SAFETY: what acts in an actor's name ends before.
+  const Reservation* reserved_for_another(const RobotId& id, const std::string& actor, microseconds ahead) const;
+  std::string account_of(const std::string& actor) const;
+  void set_account_of(Reservations::AccountOf account_of);
 
   // Something was refused before it came to one of the functions above: the audit gets an entry. `what` is "command" or
   // "control", `detail` what is known of the request, as a JSON object.

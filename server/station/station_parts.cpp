@@ -25,6 +25,23 @@ void StationParts::publish(const Authority::Change& change, const std::string& a
   notifier.publish(robot);
 }
 
+void StationParts::end_control() {
+  for (const Authority::Change& change : control.expire()) publish(change, "station", "");
+}
+
+void StationParts::show_reservations() {
+  const std::int64_t utc_us = clock.utc_us();
+  control.reservations().forget_over(utc_us);
+  for (auto& [id, entry] : robots.entries()) {
+    const Reservation* running = control.reservations().running(id, utc_us);
+    const Reservation* shown = entry.robot.reservation ? &*entry.robot.reservation : nullptr;
+    const bool is_same = running == nullptr || shown == nullptr ? running == shown : *running == *shown;
+    if (is_same) continue;
+    entry.robot.reservation = running == nullptr ? std::nullopt : std::optional{*running};
+    notifier.publish(entry.robot);
+  }
+}
+
 void StationParts::publish_stops_of(const std::function<void(std::vector<CommandRecord>&)>& act,
                                     const RobotState* robot) {
   std::exception_ptr first_failure;

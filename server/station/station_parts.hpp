@@ -32,6 +32,10 @@ struct StationParts {
 
   // A change of control has been decided: what it ends is dropped, and everybody is notified.
   void publish(const Authority::Change& change, const std::string& actor, const std::string& peer);
+  // Publishes the ends of control that time or a reservation has brought.
+  void end_control();
+  // Publishes the robots whose running reservation is another one than was shown last.
+  void show_reservations();
   // SAFETY: runs `act`, which hands stops to a link, and then publishes each record that it made and, if there is one,
   // `robot`; also when `act` or a sink throws: a stop must be known after a restart. The first exception goes on then.
   void publish_stops_of(const std::function<void(std::vector<CommandRecord>& made)>& act,

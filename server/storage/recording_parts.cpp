@@ -34,6 +34,7 @@ RecordingParts::RecordingParts(asio::io_context& loop, runtime::Clock& clock, ru
       fluid_models{clock, recorder},
       metrics{recorder, reader},
       designs{clock, recorder, reader},
+      reservations{clock, recorder, reader},
       jobs{loop, clock, recorder, reader},
       history{options.path, recorder, readers},
       exports{options.path, recorder, exports_worker},
@@ -62,6 +63,7 @@ asio::awaitable<RestoredState> RecordingParts::open() {
   co_await runs.load();
   co_await references.open();
   co_await fluid_models.load();
+  restored.reservations = co_await reservations.load();
   co_await jobs.load();
   co_await job_files.open();
   co_await retention.open();

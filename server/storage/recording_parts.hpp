@@ -17,6 +17,7 @@
 #include "server/storage/jobs/job_files.hpp"
 #include "server/storage/jobs/jobs.hpp"
 #include "server/storage/query/history.hpp"
+#include "server/storage/reservations/reservation_book.hpp"
 #include "server/storage/runs/fluid_models.hpp"
 #include "server/storage/runs/markers.hpp"
 #include "server/storage/runs/outside_references.hpp"
@@ -63,6 +64,7 @@ struct RecordingParts {
   FluidModels fluid_models;
   MetricsOfRuns metrics;
   Designs designs;
+  ReservationBook reservations;
   Jobs jobs;
   History history;
   History exports;  // the same on a worker of its own, so that no page waits behind an export

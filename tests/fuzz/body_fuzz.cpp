@@ -58,9 +58,9 @@ class BodyStation : public ApiTest {
   void TestBody() override {}
 
   static std::string target_of(const std::string& pattern) {
-    const std::map<std::string, std::string> values{{"robot_id", "r1"}, {"run_id", "1"},       {"job_id", "1"},
-                                                    {"user", "anna"},   {"token", "ci"},       {"session", "1"},
-                                                    {"fluid", "water"}, {"experiment_id", "1"}};
+    const std::map<std::string, std::string> values{
+        {"robot_id", "r1"}, {"run_id", "1"},    {"job_id", "1"},        {"user", "anna"},       {"token", "ci"},
+        {"session", "1"},   {"fluid", "water"}, {"experiment_id", "1"}, {"reservation_id", "1"}};
     std::string target;
     for (std::size_t i = 0; i < pattern.size(); ++i) {
       if (pattern[i] != '{') {

@@ -57,6 +57,7 @@ const robot = (robot_id: string, seq: number): RobotState => ({
   },
   clock: { offset_us: 0, uncertainty_us: 310, drift_ppm: 12, round_trip_us: 1840 },
   control: null,
+  reservation: null,
   pending_stop: null,
   fluid: null,
   model: { state: 'assumed', fluid: null, reason: '', fit_error: null, set_at_us: null },

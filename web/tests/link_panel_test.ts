@@ -24,6 +24,7 @@ const robot_with = (changed_limits: RobotState['changed_limits']) =>
     next_seq: 0,
     durable_next_seq: 0,
     control: null,
+    reservation: null,
   }) as RobotState;
 
 test('a limit that differs from its default is shown until it is restored', async () => {

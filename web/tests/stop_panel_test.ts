@@ -28,6 +28,7 @@ const latched = (emergency_id: string) =>
     emergency_id,
     emergency_cause: 'operator',
     control: null,
+    reservation: null,
     pending_stop: null,
   }) as RobotState;
 

@@ -32,6 +32,7 @@ struct Limit {
 inline constexpr std::int64_t kMaxUint32 = std::numeric_limits<std::uint32_t>::max();
 inline constexpr std::int64_t kMaxJavaScriptInteger = 9'007'199'254'740'991;
 inline constexpr std::int64_t kMostTracesMs = 86'400'000;
+inline constexpr double kLongestReservation_s = station::kLongestReservation / std::chrono::seconds{1};
 inline constexpr Range<std::size_t> kNameBytes{1, 200}, kTextBytes{0, 4000}, kReasonBytes{1, 4000};
 inline constexpr Range<double> kReferenceSeconds{-1e10, 1e10}, kReferenceClockSd_s{0, 1000};
 
@@ -61,6 +62,8 @@ inline constexpr Limit<std::size_t> kTextLimits[] = {
     {"ReferenceBody.reason", kReasonBytes},
     {"ReferenceBody.source", kNameBytes},
     {"ReferenceClock.marker_text", kReasonBytes},
+    {"ReservationBody.holder", kNameBytes},
+    {"ReservationBody.purpose", {0, 200}},
     {"RunAnnotationBody.fluid", kTextBytes},
     {"RunAnnotationBody.name", kNameBytes},
     {"RunAnnotationBody.notes", kTextBytes},
@@ -127,6 +130,8 @@ inline constexpr Limit<std::int64_t> kIntegerLimits[] = {
     {"ReportJobBody.runs[]", {1, kMaxJavaScriptInteger}},
     {"SeqSpan.first_seq", {0, kMaxTimeUs - 1}},
     {"SeqSpan.last_seq", {0, kMaxTimeUs - 1}},  // from first_seq on
+    {"ReservationBody.from_us", {0, kMaxTimeUs}},
+    {"ReservationBody.until_us", {0, kMaxTimeUs}},
     {"SetControllerBody.controller_id", {1, kMaxUint32}},
     {"SetDutyBody.lease_ms", {1, protocol::kLeaseMs}},
     {"SetDutyScheduleBody.schedule[].tick", {0, kMaxUint32}},
@@ -167,6 +172,7 @@ inline constexpr Limit<double> kNumberLimits[] = {
     {"ReferenceClock.offset_s", kReferenceSeconds},
     {"ReferenceClock.sd_s", kReferenceClockSd_s},
     {"ReferenceClock.to_s", kReferenceSeconds},
+    {"ReservationBody.for_s", {1, kLongestReservation_s}},
     {"TuneJobBody.crossover_rad_s", {1e-3, 1e4}},
     {"TuneJobBody.duty_max", {0.01, 1}},
     {"TuneJobBody.duty_min", {-1, 0}},

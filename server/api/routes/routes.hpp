@@ -1,6 +1,6 @@
 // All routes of the API, grouped by noun: routes_station, routes_recording, routes_robots, routes_commands,
-// routes_in_force, routes_fluids, routes_runs, routes_markers, routes_references, routes_samples, routes_overview,
-// routes_exports, routes_accounts, routes_audit; and those of server/api/analysis.
+// routes_in_force, routes_fluids, routes_runs, routes_markers, routes_references, routes_reservations, routes_samples,
+// routes_overview, routes_exports, routes_accounts, routes_audit; and those of server/api/analysis.
 //
 // Held to openapi.yaml both ways by a test. Each answer is a coroutine that can be called without a server.
 #pragma once
@@ -56,6 +56,7 @@ class History;
 class Markers;
 class OutsideReferences;
 class Recorder;
+class ReservationBook;
 class RunDigester;
 class Runs;
 struct OutsideReference;
@@ -153,6 +154,14 @@ struct ReferenceRoutes {
   storage::OutsideReferences& references;
 };
 void add_reference_routes(http::Router& router, ReferenceRoutes parts);
+
+struct ReservationRoutes {
+  identity::Accounts& accounts;
+  runtime::Clock& clock;
+  storage::ReservationBook& reservations;
+  station::Station& station;
+};
+void add_reservation_routes(http::Router& router, ReservationRoutes parts);
 
 struct RobotRoutes {
   boost::asio::io_context& loop;

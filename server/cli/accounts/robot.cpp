@@ -86,11 +86,13 @@ void add_options(CLI::App& command, RobotCommand& options) {
         ->check(robot_id());
   }
   add_options(command, options.settings);
+  add_options(command, options.reservations);
   command.footer("Example: rheonaut robot list --data lab");
 }
 
 int run(const RobotCommand& options, std::ostream& out) {
   if (options.settings.of != RobotSettingsCommand::Of::nothing) return run(options.settings, out);
+  if (options.reservations.act != RobotReservationCommand::Act::nothing) return run(options.reservations, out);
   if (options.act == RobotCommand::Act::enroll) return enroll(options, out);
   AccountAccess accounts{options.data_dir, AccountAccess::Missing::refuse};
   if (options.act == RobotCommand::Act::list) return list_robots(accounts.enrolments(), options.json, out);

@@ -7,6 +7,7 @@
 #include <iosfwd>
 #include <string>
 
+#include "server/cli/accounts/robot_reservations.hpp"
 #include "server/cli/accounts/robot_settings.hpp"
 
 namespace CLI {
@@ -21,7 +22,8 @@ struct RobotCommand {
   std::filesystem::path data_dir = "rheonaut-data";
   std::string robot_id;
   bool json = false;
-  RobotSettingsCommand settings;  // runs instead, unless its `of` is nothing
+  RobotSettingsCommand settings;         // runs instead, unless its `of` is nothing
+  RobotReservationCommand reservations;  // likewise, unless its `act` is nothing
 };
 
 void add_options(CLI::App& command, RobotCommand& options);

@@ -116,7 +116,8 @@ Request request_to(const std::string& method, const std::string& target, const s
 }  // namespace
 
 nlohmann::json asked(StationAnswer answer) {
-  if (answer.status == 200 || answer.status == 202) return std::move(answer.body);
+  constexpr int kFirstSuccess = 200, kFirstRedirection = 300;
+  if (answer.status >= kFirstSuccess && answer.status < kFirstRedirection) return std::move(answer.body);
   const bool says_why = answer.body.is_object();
   throw std::runtime_error{
       fmt::format("the station refused: {}", says_why ? answer.body.value("detail", "no reason") : "no reason")};

@@ -15,7 +15,7 @@ struct StationAnswer {
   std::string text;     // of what is not JSON
 };
 
-// The body of an answer 200 or 202. Throws std::runtime_error saying what the station refused.
+// The body of an answer that is a success. Throws std::runtime_error saying what the station refused.
 nlohmann::json asked(StationAnswer answer);
 
 class StationClient {

@@ -268,7 +268,14 @@ asio::awaitable<Result<ExperimentView>> Experiments::take_over(ExperimentId id, 
   if (state == ExperimentState::aborting || storage::has_ended(state)) {
     co_return wrong_state(view_of(entry), "taken over");
   }
-  const std::string holder = parts_.station.holder(entry.experiment.request.robot_id);
+  const station::RobotId& robot_id = entry.experiment.request.robot_id;
+  const std::string holder = parts_.station.holder(robot_id);
+  if (const auto* slot = parts_.station.reserved_for_another(robot_id, by.actor, microseconds{0})) {
+    co_return fail(
+        ErrorCode::conflict,
+        fmt::format("its robot is reserved for {} until {}", slot->holder, station::utc_text(slot->until_us)),
+        "reserved");
+  }
   // SAFETY: control never changes hands by the way of an experiment.
   if (!holder.empty() && holder != by.actor) {
     co_return fail(ErrorCode::conflict, fmt::format("control of its robot is with {}; take that first", holder),
@@ -277,7 +284,7 @@ asio::awaitable<Result<ExperimentView>> Experiments::take_over(ExperimentId id, 
   const bool needs_control = entry.conduct != nullptr && holder.empty();
   if (needs_control) {
     station::ControlRequest request;
-    request.robot_id = entry.experiment.request.robot_id;
+    request.robot_id = robot_id;
     request.actor = by.actor;
     request.peer = by.peer;
     const auto taken = parts_.station.control(request);

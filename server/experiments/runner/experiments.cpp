@@ -21,11 +21,13 @@ namespace {
 
 constexpr microseconds kLookAtQueues = 200ms;
 constexpr microseconds kPublishEvery = 1s;
-constexpr microseconds kUnusedFor = 3s;  // by people, before an experiment begins by itself
+constexpr microseconds kUnusedFor = 3s;   // by people, before an experiment begins by itself
+constexpr microseconds kRestBefore = 5s;  // the slot of somebody else
 
 // What keeps one experiment from its beginning and no other one behind it.
-constexpr std::array<std::string_view, 5> kLetsOthersGo{"held", "nobody_present", "control_of_another", "unreadable",
-                                                        "unattended_not_allowed"};
+constexpr std::array<std::string_view, 7> kLetsOthersGo{"held",         "nobody_present",         "control_of_another",
+                                                        "unreadable",   "unattended_not_allowed", "reserved",
+                                                        "reserved_soon"};
 
 bool comes_before(const Experiment& a, const Experiment& b) {
   if (a.request.priority != b.request.priority) return a.request.priority > b.request.priority;
@@ -53,6 +55,7 @@ asio::awaitable<void> Experiments::run() {
   std::int64_t published_us = 0;
   for (;;) {
     put_interrupted_to_rest();
+    for (const auto& [robot, id] : running_) abort_if_reserved(robot);
     begin_what_may();
     note_states();
     const std::int64_t now_us = parts_.clock.steady_us();
@@ -95,6 +98,7 @@ Experiments::WaitReason Experiments::wait_reason_of(const Entry& entry) const {
   if (experiment.request.is_unattended && !allow_unattended_) {
     return {"unattended_not_allowed", "the station's configuration does not allow unattended experiments"};
   }
+  if (WaitReason reserved = reserved_for_another(experiment); !reserved.reason.empty()) return reserved;
   if (robot->latched()) return {"emergency", "the robot is in emergency"};
   if (!is_at_rest(*robot)) return {"robot_not_at_rest", "the robot is not in manual at duty 0"};
   const std::string holder = parts_.station.holder(robot->id);
@@ -116,6 +120,19 @@ Experiments::WaitReason Experiments::wait_reason_of(const Entry& entry) const {
   if (const auto room = recording_.disk_watch.may_begin("an experiment"); !room)
     return {"disk_space", room.error().detail};
   return {};
+}
+
+Experiments::WaitReason Experiments::reserved_for_another(const Experiment& experiment) const {
+  const microseconds lasts{static_cast<std::int64_t>(experiment.duration_s * 1e6)};
+  const station::Reservation* slot =
+      parts_.station.reserved_for_another(experiment.request.robot_id, experiment.acts_for, lasts + kRestBefore);
+  if (slot == nullptr) return {};
+  const std::string from = station::utc_text(slot->from_us), until = station::utc_text(slot->until_us);
+  if (slot->from_us <= parts_.clock.utc_us()) {
+    return {"reserved", fmt::format("the robot is reserved for {} until {}", slot->holder, until)};
+  }
+  return {"reserved_soon", fmt::format("the robot is reserved for {} from {} until {}, and it lasts {:.0f} s",
+                                       slot->holder, from, until, experiment.duration_s)};
 }
 
 void Experiments::begin_what_may() {
@@ -140,6 +157,17 @@ void Experiments::begin_what_may() {
 }
 
 // --- one that runs ---
+
+// SAFETY: the robot is at rest when the slot of somebody else begins, while its actor may still command it.
+void Experiments::abort_if_reserved(const station::RobotId& robot_id) {
+  Conduct* conduct = conduct_of(robot_id);
+  if (conduct == nullptr || conduct->is_aborting()) return;
+  const std::string& actor = entries_.at(running_.at(robot_id)).experiment.acts_for;
+  const station::Reservation* slot = parts_.station.reserved_for_another(robot_id, actor, kRestBefore);
+  if (slot == nullptr) return;
+  conduct->abort({"reserved", fmt::format("the robot is reserved for {} from {} until {}", slot->holder,
+                                          station::utc_text(slot->from_us), station::utc_text(slot->until_us))});
+}
 
 asio::awaitable<void> Experiments::carry_out(ExperimentId id) {
   Entry& entry = entries_.at(id);
@@ -303,6 +331,7 @@ void Experiments::on_samples(const station::RobotState& robot, const station::Sa
 }
 
 void Experiments::on_robot(const station::RobotState& robot) {
+  abort_if_reserved(robot.id);  // before anything else that the end of control means to it
   if (Conduct* conduct = conduct_of(robot.id)) conduct->on_robot(robot);
 }
 

@@ -123,6 +123,8 @@ class Experiments final : public station::StationSink {
   void begin_what_may();
   void put_interrupted_to_rest();
   WaitReason wait_reason_of(const Entry& entry) const;
+  WaitReason reserved_for_another(const storage::Experiment& experiment) const;  // empty: it is not, or not that soon
+  void abort_if_reserved(const station::RobotId& robot_id);
   std::vector<Entry*> queue_of(const station::RobotId& robot_id);
   Result<Entry*> entry_of(storage::ExperimentId id);
   Result<void> check_request(const storage::ExperimentRequest& request) const;

@@ -14,7 +14,6 @@ using storage::Experiment;
 namespace {
 
 constexpr microseconds kReadAgainAfter = 1s;
-constexpr const char* kStationActor = "station:experiments";
 
 // The document was checked before it was stored.
 std::optional<Profile> profile_of(const Experiment& experiment) {

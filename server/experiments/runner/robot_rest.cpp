@@ -44,6 +44,9 @@ asio::awaitable<Rest> bring_to_rest(station::Station& station, runtime::Clock& c
       auto command = to_manual(request);
       const auto sent = co_await station.submit(std::move(command));
       if (!sent && sent.error().reason == "not_in_control") co_return Rest::of_another;
+      // SAFETY: a reservation keeps an actor from commanding, and no robot from being brought to rest. Its holder, once
+      // in control, is responsible: the station's command is refused then.
+      if (!sent && sent.error().reason == "reserved") request.actor = kStationActor;
       if (sent && was_accepted(sent->state)) ordered_at_robot_us = sent->effect_at_robot_us;
     }
     co_await clock.sleep_for(kTry);

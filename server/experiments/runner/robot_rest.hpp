@@ -20,6 +20,7 @@ enum class Rest : std::uint8_t {
   stopped,     // it did not obey: an emergency stop was sent, or is kept
 };
 
+inline constexpr const char* kStationActor = "station:experiments";  // in the name of nobody else
 inline constexpr microseconds kRestLimit{40'000'000};  // a robot without a link is at rest after 30 s, or never
 
 // In manual at duty 0, as its telemetry shows.

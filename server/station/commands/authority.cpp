@@ -1,4 +1,4 @@
-// A lease a robot, ended by time, by its holder or by force.
+// A lease a robot, ended by time, by its holder, by force or by a reservation.
 #include "server/station/commands/authority.hpp"
 
 #include <fmt/format.h>
@@ -18,15 +18,41 @@ std::unexpected<Error> held_by(const RobotId& robot, const std::string& holder) 
 
 ControlState Authority::of(const RobotId& robot) const {
   const auto found = leases_.find(robot);
-  const std::int64_t now_us = clock_.steady_us();
-  if (found == leases_.end() || found->second.ends_us <= now_us) return {};
+  if (found == leases_.end() || !is_live(robot, found->second)) return {};
   const Lease& lease = found->second;
-  return {lease.holder, lease.taken_at_us, lease.request_ends_us > now_us ? lease.requested_by : std::string{}};
+  const bool is_requested = lease.request_ends_us > clock_.steady_us();
+  return {lease.holder, lease.taken_at_us, is_requested ? lease.requested_by : std::string{}};
+}
+
+// SAFETY: a lease ends with the slot of somebody else, at once, and however often it is renewed.
+bool Authority::is_live(const RobotId& robot, const Lease& lease) const {
+  if (lease.ends_us <= clock_.steady_us()) return false;
+  return lease.is_forced || reservations_.keeps_out(robot, lease.holder, clock_.utc_us()) == nullptr;
+}
+
+const Reservation* Authority::keeps_out(const RobotId& robot, const std::string& actor, microseconds ahead) const {
+  const auto found = leases_.find(robot);
+  const bool is_by_force = found != leases_.end() && found->second.is_forced && found->second.holder == actor &&
+                           is_live(robot, found->second);
+  if (is_by_force) return nullptr;
+  const std::int64_t utc_us = clock_.utc_us();
+  return reservations_.keeps_out(robot, actor, utc_us, utc_us + std::max<std::int64_t>(ahead.count(), 1));
+}
+
+Result<void> Authority::check_reserved(const RobotId& robot, const std::string& actor) const {
+  const Reservation* reservation = keeps_out(robot, actor, microseconds{0});
+  if (reservation == nullptr) return {};
+  return fail(ErrorCode::conflict,
+              fmt::format("robot '{}' is reserved for {} until {} (reservation {}) and {} may not command it; wait "
+                          "until then, or ask {} or an administrator to cancel it",
+                          robot, reservation->holder, utc_text(reservation->until_us), reservation->id, actor,
+                          reservation->holder),
+              "reserved");
 }
 
 Authority::Lease* Authority::lease_of(const RobotId& robot) {
   const auto found = leases_.find(robot);
-  return found == leases_.end() || found->second.ends_us <= clock_.steady_us() ? nullptr : &found->second;
+  return found == leases_.end() || !is_live(robot, found->second) ? nullptr : &found->second;
 }
 
 Authority::Lease& Authority::give(const RobotId& robot, const std::string& actor, microseconds duration) {
@@ -45,6 +71,7 @@ Result<Authority::Lease*> Authority::own_lease(const RobotId& robot, const std::
 }
 
 Result<void> Authority::may_use(const RobotId& robot, const std::string& actor) const {
+  if (auto checked = check_reserved(robot, actor); !checked) return checked;
   const ControlState now = of(robot);
   if (now.holder.empty() || now.holder == actor) return {};
   return held_by(robot, now.holder);
@@ -59,6 +86,8 @@ Result<std::optional<Authority::Change>> Authority::use(const RobotId& robot, co
 
 Result<std::optional<Authority::Change>> Authority::take(const RobotId& robot, const std::string& actor,
                                                          microseconds duration) {
+  // SAFETY: nobody commands in the slot of somebody else.
+  if (auto checked = check_reserved(robot, actor); !checked) return std::unexpected{checked.error()};
   Lease* lease = lease_of(robot);
   // SAFETY: control is never shared, and never changes hands behind its holder's back.
   if (lease != nullptr && lease->holder != actor) return held_by(robot, lease->holder);
@@ -74,7 +103,7 @@ Result<std::optional<Authority::Change>> Authority::take(const RobotId& robot, c
 Authority::Change Authority::take_by_force(const RobotId& robot, const std::string& actor, const std::string& reason) {
   const Lease* lease = lease_of(robot);
   const std::string from = lease == nullptr ? "nobody" : lease->holder;
-  give(robot, actor, kControlLease);
+  give(robot, actor, kControlLease).is_forced = true;
   return {robot, "control_forced", fmt::format("by {} from {}: {}", actor, from, reason)};
 }
 
@@ -86,6 +115,7 @@ Result<Authority::Change> Authority::release(const RobotId& robot, const std::st
 }
 
 Result<Authority::Change> Authority::request(const RobotId& robot, const std::string& actor) {
+  if (auto checked = check_reserved(robot, actor); !checked) return std::unexpected{checked.error()};
   Lease* lease = lease_of(robot);
   if (lease == nullptr) {
     return fail(ErrorCode::conflict, fmt::format("nobody controls robot '{}'; take control", robot), "control_is_free");
@@ -103,6 +133,8 @@ Result<Authority::Change> Authority::hand_over(const RobotId& robot, const std::
     return fail(ErrorCode::conflict, fmt::format("nobody has asked for control of robot '{}'", robot), "not_requested");
   }
   const std::string to = (*lease)->requested_by;
+  // SAFETY: a slot that keeps them out may have begun since they asked.
+  if (auto checked = check_reserved(robot, to); !checked) return std::unexpected{checked.error()};
   give(robot, to, kControlLease);
   return Change{robot, "control_handed_over", fmt::format("by {} to {}", actor, to)};
 }
@@ -111,17 +143,23 @@ void Authority::keep_alive(const std::string& actor) {
   const std::int64_t now_us = clock_.steady_us();
   for (auto& [robot, lease] : leases_) {
     // SAFETY: what has ended stays ended.
-    const bool is_own = lease.holder == actor && lease.ends_us > now_us;
+    const bool is_own = lease.holder == actor && is_live(robot, lease);
     if (is_own) lease.ends_us = std::max(lease.ends_us, now_us + lease.duration.count());
   }
 }
 
 std::vector<Authority::Change> Authority::expire() {
   std::vector<Change> changes;
-  std::erase_if(leases_, [&changes, now_us = clock_.steady_us()](const auto& entry) {
+  std::erase_if(leases_, [&](const auto& entry) {
     const auto& [robot, lease] = entry;
-    if (lease.ends_us > now_us) return false;
-    changes.push_back({robot, "control_expired", lease.holder + " has gone silent"});
+    if (is_live(robot, lease)) return false;
+    const Reservation* by = reservations_.keeps_out(robot, lease.holder, clock_.utc_us());
+    if (lease.ends_us <= clock_.steady_us() || by == nullptr) {
+      changes.push_back({robot, "control_expired", lease.holder + " has gone silent"});
+    } else {
+      changes.push_back({robot, "control_ended_by_reservation",
+                         fmt::format("of {}: the robot is reserved for {}", lease.holder, by->holder)});
+    }
     return true;
   });
   return changes;

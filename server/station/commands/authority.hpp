@@ -1,8 +1,9 @@
 // Who may command which robot: control is a lease that one actor holds and keeps renewing.
 //
 // An actor is a session of a page ("session:3") or a token ("token:local"). An actor that commands a robot without a
-// holder becomes its holder. An emergency stop is never checked here. Loop thread; only keeps the leases: the station
-// reports changes.
+// holder becomes its holder. While a reservation keeps an actor out they neither get nor have control, unless an
+// administrator took it by force. An emergency stop is never checked here. Loop thread; only keeps the leases: the
+// station reports changes.
 #pragma once
 
 #include <cstdint>
@@ -14,6 +15,7 @@
 #include "server/runtime/clock.hpp"
 #include "server/runtime/result.hpp"
 #include "server/station/commands/requests.hpp"
+#include "server/station/commands/reservations.hpp"
 #include "server/station/state/station_state.hpp"
 
 namespace server::station {
@@ -29,12 +31,14 @@ class Authority {
     std::string cause;  // who, from whom, why
   };
 
-  explicit Authority(runtime::Clock& clock) : clock_{clock} {}
+  // Both outlive it.
+  Authority(runtime::Clock& clock, const Reservations& reservations) : clock_{clock}, reservations_{reservations} {}
 
   // Who holds control now; no holder: nobody.
   ControlState of(const RobotId& robot) const;
 
-  // Whether a command of the actor would be let through; conflict when another holds control.
+  // Whether a command of the actor would be let through; conflict when another holds control, or has reserved the robot
+  // (reason "reserved"). So do all below but force and release.
   Result<void> may_use(const RobotId& robot, const std::string& actor) const;
 
   // For a command of the actor: control is its own afterwards, at least for kControlLease. conflict when another holds
@@ -51,6 +55,10 @@ class Authority {
   // To the actor that requested it.
   Result<Change> hand_over(const RobotId& robot, const std::string& actor);
 
+  // The first reservation that keeps the actor out of the robot between now and so much later; null: none, or they
+  // control the robot by force.
+  const Reservation* keeps_out(const RobotId& robot, const std::string& actor, microseconds ahead) const;
+
   // Extends every lease of the actor to its duration from now.
   void keep_alive(const std::string& actor);
 
@@ -65,13 +73,17 @@ class Authority {
     microseconds duration{0};
     std::string requested_by;
     std::int64_t request_ends_us = 0;  // steady
+    bool is_forced = false;            // no reservation ends it
   };
 
+  bool is_live(const RobotId& robot, const Lease& lease) const;
+  Result<void> check_reserved(const RobotId& robot, const std::string& actor) const;
   Lease* lease_of(const RobotId& robot);  // null when nobody holds it now
   Lease& give(const RobotId& robot, const std::string& actor, microseconds duration);
   Result<Lease*> own_lease(const RobotId& robot, const std::string& actor);
 
   runtime::Clock& clock_;
+  const Reservations& reservations_;
   std::map<RobotId, Lease> leases_;  // of known robots only
 };
 

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "protocol/messages.hpp"
+#include "server/station/state/reservation.hpp"
 #include "server/station/state/telemetry_fields.hpp"
 
 // In the namespace of the generated struct. Byte by byte, so that no field is forgotten and NaN equals NaN; padding, if
@@ -176,8 +177,9 @@ struct RobotState {
   std::vector<ChangedLimit> changed_limits;  // as the robot said last
   std::uint64_t invalid_values = 0;  // that its frames had since the station started: not finite, beyond all range
   ControlState control;
-  std::optional<CommandId> pending_stop;  // an emergency stop that no robot has acknowledged yet
-  std::int64_t retired_at_us = 0;         // UTC; 0: in use
+  std::optional<Reservation> reservation;  // that runs now
+  std::optional<CommandId> pending_stop;   // an emergency stop that no robot has acknowledged yet
+  std::int64_t retired_at_us = 0;          // UTC; 0: in use
 
   // The station's own latch: no motion command passes while it is set.
   bool latched() const { return pending_stop.has_value() || context.emergency_id != 0; }

@@ -30,7 +30,7 @@ OpenedDatabase DatabaseWorker::open_now(std::int64_t utc_us) {
   BootStore boots{*database_};
   const std::int64_t next_boot_key = boots.next_boot_key();
   spdlog::info("audit: goes on from {}", text(audit_head(database_->handle())));
-  return {.restored = {database_->store_id(), boots.robots(), pending_stops(*database_)},
+  return {.restored = {database_->store_id(), boots.robots(), pending_stops(*database_), {}},
           .next_boot_key = next_boot_key,
           .restored_at_us = database_->restored_at_us()};
 }

@@ -27,6 +27,7 @@ struct RestoredState {
   std::uint64_t store_id = 0;
   std::vector<station::RestoredRobot> robots;
   std::vector<station::CommandRecord> pending_stops;  // emergency stops that no robot has acknowledged
+  std::vector<station::Reservation> reservations;     // that are neither over nor cancelled
 };
 
 // What the recorder must know, too.

@@ -492,3 +492,20 @@ CREATE TABLE experiment_run (
   ended_at_us INTEGER,                      -- NULL: it has not ended
   PRIMARY KEY (experiment_id, number)
 ) WITHOUT ROWID;
+CREATE TABLE reservation (
+  reservation_id INTEGER PRIMARY KEY,
+  robot_id TEXT NOT NULL,
+  holder TEXT NOT NULL,                     -- user:NAME, token:NAME or session:NUMBER
+  from_us INTEGER NOT NULL,
+  until_us INTEGER NOT NULL,                -- the first moment that does not belong to it
+  purpose TEXT NOT NULL,
+  made_by TEXT NOT NULL,                    -- the actor
+  made_at_us INTEGER NOT NULL,
+  cancelled_at_us INTEGER,                  -- NULL: it is not
+  cancelled_by TEXT NOT NULL DEFAULT ''     -- the actor
+);
+CREATE INDEX reservation_by_robot ON reservation(robot_id, until_us);
+CREATE TRIGGER reservation_never_overlaps BEFORE INSERT ON reservation
+WHEN EXISTS (SELECT 1 FROM reservation WHERE robot_id = NEW.robot_id AND cancelled_at_us IS NULL
+  AND from_us < NEW.until_us AND NEW.from_us < until_us)
+BEGIN SELECT RAISE(ABORT, 'reservations of one robot never overlap'); END;

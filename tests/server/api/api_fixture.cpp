@@ -26,7 +26,7 @@ TemporaryFolder::~TemporaryFolder() { std::filesystem::remove_all(path_); }
 namespace {
 asio::awaitable<void> start(storage::RecordingParts& recording, station::Station& station, bool& started) {
   const storage::RestoredState restored = co_await recording.open();
-  station.restore(restored.robots, restored.pending_stops);
+  station.restore(restored.robots, restored.pending_stops, restored.reservations);
   started = true;
 }
 
@@ -107,9 +107,9 @@ std::shared_ptr<std::optional<Answered>> ApiTest::begin(const std::string& metho
   request.target = target;
   request.headers = std::move(headers);
   if (!body.is_null()) request.body = body.dump();
-  request.actor = "token:local";
+  request.actor = actor;
   request.peer = "127.0.0.1";
-  request.caller = identity::Caller{"token:local", "", scopes, session, standing, "127.0.0.1"};
+  request.caller = identity::Caller{actor, "", scopes, session, standing, "127.0.0.1"};
   auto into = std::make_shared<std::optional<Answered>>();
   tasks.spawn("ask", answer(std::move(request), into));
   clock.settle();

@@ -62,6 +62,7 @@ class ApiTest : public ::testing::Test {
   std::string token() const;
 
   identity::Scopes scopes = identity::Scopes::of(identity::Role::admin);  // of who asks
+  std::string actor = "token:local";                                      // likewise
   std::uint64_t session = 0;                                              // likewise: of a page
   config::Config config;                                                  // of the ports
   TemporaryFolder folder;

@@ -12,9 +12,22 @@ using namespace std::chrono_literals;
 
 class AuthorityTest : public ::testing::Test {
  protected:
+  // From now on, or so much later, for an hour.
+  void reserve(const std::string& holder, microseconds in = 0us) {
+    station::Reservation slot;
+    slot.id = 7;
+    slot.robot_id = "r1";
+    slot.holder = holder;
+    slot.from_us = clock_.utc_us() + in.count();
+    slot.until_us = slot.from_us + microseconds{1h}.count();
+    reservations_.add(std::move(slot));
+  }
+  static std::string reason(const auto& result) { return result ? "" : result.error().reason; }
+
   boost::asio::io_context loop_;
   VirtualClock clock_{loop_};
-  station::Authority authority_{clock_};
+  station::Reservations reservations_;
+  station::Authority authority_{clock_, reservations_};
 };
 
 TEST_F(AuthorityTest, WhoCommandsFirstIsInControlAndAnotherIsRefusedByName) {
@@ -103,6 +116,105 @@ TEST_F(AuthorityTest, ForceTakesItWithAReason) {
   EXPECT_EQ(change.kind, "control_forced");
   EXPECT_EQ(change.cause, "by session:2 from session:1: the operator has left");
   EXPECT_FALSE(authority_.use("r1", "session:1"));
+}
+
+// SAFETY: each way to control, tried by somebody who is kept out.
+TEST_F(AuthorityTest, WhileARobotIsReservedNobodyElseGetsControlOfIt) {
+  reserve("user:anna");
+  EXPECT_EQ(reason(authority_.may_use("r1", "user:ben/session:2")), "reserved");
+  EXPECT_EQ(reason(authority_.use("r1", "user:ben/session:2")), "reserved");
+  EXPECT_EQ(reason(authority_.take("r1", "user:ben/session:2", 3s)), "reserved");
+  EXPECT_EQ(reason(authority_.request("r1", "user:ben/session:2")), "reserved");
+  EXPECT_EQ(authority_.of("r1").holder, "");
+  const std::string detail = authority_.may_use("r1", "user:ben/session:2").error().detail;
+  EXPECT_NE(detail.find("reserved for user:anna until " + station::utc_text(clock_.utc_us() + 3'600'000'000)),
+            std::string::npos)
+      << detail;
+  EXPECT_TRUE(authority_.may_use("r2", "user:ben/session:2"));
+  ASSERT_TRUE(authority_.use("r1", "user:anna/session:1"));
+  EXPECT_EQ(reason(authority_.request("r1", "user:ben/session:2")), "reserved");
+  EXPECT_EQ(reason(authority_.take("r1", "user:anna/session:9", 3s)), "not_in_control") << "one page at a time";
+}
+
+TEST_F(AuthorityTest, ASlotBeginsAndEndsInOneMoment) {
+  reserve("user:anna", 10s);
+  clock_.run_for(10s - 1us);
+  EXPECT_TRUE(authority_.may_use("r1", "token:ci"));
+  clock_.run_for(1us);
+  EXPECT_EQ(reason(authority_.may_use("r1", "token:ci")), "reserved");
+  clock_.run_for(1h - 1us);
+  EXPECT_EQ(reason(authority_.may_use("r1", "token:ci")), "reserved");
+  clock_.run_for(1us);
+  EXPECT_TRUE(authority_.take("r1", "token:ci", 3s));
+}
+
+// SAFETY: at once, and before anybody looks.
+TEST_F(AuthorityTest, ALeaseEndsWhenASlotOfSomebodyElseBeginsHoweverLongItIsAndHoweverOftenItIsRenewed) {
+  ASSERT_TRUE(authority_.take("r1", "token:ci", 600s));
+  reserve("user:anna", 10s);
+  clock_.run_for(10s - 1us);
+  EXPECT_EQ(authority_.of("r1").holder, "token:ci");
+  clock_.run_for(1us);
+  EXPECT_EQ(authority_.of("r1").holder, "");
+  authority_.keep_alive("token:ci");
+  EXPECT_EQ(reason(authority_.use("r1", "token:ci")), "reserved");
+  EXPECT_EQ(reason(authority_.release("r1", "token:ci")), "not_in_control");
+  const auto changes = authority_.expire();
+  ASSERT_EQ(changes.size(), 1U);
+  EXPECT_EQ(changes[0].kind, "control_ended_by_reservation");
+  EXPECT_EQ(changes[0].cause, "of token:ci: the robot is reserved for user:anna");
+  EXPECT_TRUE(authority_.expire().empty());
+  EXPECT_TRUE(authority_.take("r1", "user:anna/session:1", 3s)) << "its holder waits for nobody";
+}
+
+TEST_F(AuthorityTest, TheHoldersLeaseGoesOnIntoTheSlot) {
+  ASSERT_TRUE(authority_.take("r1", "user:anna/session:1", 60s));
+  reserve("user:anna", 10s);
+  clock_.run_for(20s);
+  EXPECT_EQ(authority_.of("r1").holder, "user:anna/session:1");
+  EXPECT_TRUE(authority_.expire().empty());
+}
+
+TEST_F(AuthorityTest, ControlIsHandedToNobodyWhoIsKeptOutByNow) {
+  ASSERT_TRUE(authority_.take("r1", "user:anna/session:1", 60s));
+  reserve("user:anna", 10s);
+  ASSERT_TRUE(authority_.request("r1", "token:ci")) << "before the slot";
+  clock_.run_for(10s);
+  EXPECT_EQ(reason(authority_.hand_over("r1", "user:anna/session:1")), "reserved");
+  EXPECT_EQ(authority_.of("r1").holder, "user:anna/session:1");
+  ASSERT_TRUE(authority_.request("r1", "user:anna/session:2"));
+  EXPECT_TRUE(authority_.hand_over("r1", "user:anna/session:1"));
+}
+
+TEST_F(AuthorityTest, AnAdministratorsForceHoldsInASlotUntilItsLeaseEnds) {
+  reserve("user:anna");
+  ASSERT_TRUE(authority_.use("r1", "user:anna/session:1"));
+  authority_.take_by_force("r1", "user:root/session:2", "the tube leaks");
+  EXPECT_EQ(authority_.of("r1").holder, "user:root/session:2");
+  EXPECT_EQ(authority_.keeps_out("r1", "user:root/session:2", 1h), nullptr);
+  for (int i = 0; i < 10; ++i) {
+    clock_.run_for(2s);
+    EXPECT_TRUE(authority_.use("r1", "user:root/session:2"));
+    authority_.keep_alive("user:root/session:2");
+    EXPECT_TRUE(authority_.take("r1", "user:root/session:2", 3s)) << "still by force";
+  }
+  EXPECT_EQ(reason(authority_.use("r1", "user:anna/session:1")), "not_in_control");
+  EXPECT_EQ(reason(authority_.use("r1", "user:root/session:3")), "reserved")
+      << "another page of theirs has not forced it";
+  clock_.run_for(3s);
+  EXPECT_EQ(reason(authority_.take("r1", "user:root/session:2", 3s)), "reserved") << "once it has ended";
+  EXPECT_EQ(authority_.expire().at(0).kind, "control_expired");
+  EXPECT_EQ(reason(authority_.take("r1", "user:root/session:2", 3s)), "reserved");
+}
+
+TEST_F(AuthorityTest, WhatIsHandedOverAfterAForceIsNoForce) {
+  authority_.take_by_force("r1", "user:root/session:2", "to help");
+  ASSERT_TRUE(authority_.request("r1", "token:ci"));
+  ASSERT_TRUE(authority_.hand_over("r1", "user:root/session:2"));
+  ASSERT_TRUE(authority_.take("r1", "token:ci", 60s));
+  reserve("user:anna", 10s);
+  clock_.run_for(10s);
+  EXPECT_EQ(authority_.of("r1").holder, "");
 }
 
 }  // namespace

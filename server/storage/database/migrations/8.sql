@@ -1,4 +1,4 @@
--- The eighth migration: jobs, models and controllers that are kept, metrics of runs.
+-- The eighth migration: jobs, models and controllers that are kept, metrics of runs, experiments, reservations.
 --
 -- It adds tables only: no row is rewritten.
 
@@ -107,3 +107,23 @@ CREATE TABLE experiment_run (
   ended_at_us INTEGER,                      -- NULL: it has not ended
   PRIMARY KEY (experiment_id, number)
 ) WITHOUT ROWID;
+
+-- Reservations of robots: time slots in which one account may command one. Of those that are over or cancelled the
+-- newest 10000 are kept.
+CREATE TABLE reservation (
+  reservation_id INTEGER PRIMARY KEY,
+  robot_id TEXT NOT NULL,
+  holder TEXT NOT NULL,                     -- user:NAME, token:NAME or session:NUMBER
+  from_us INTEGER NOT NULL,
+  until_us INTEGER NOT NULL,                -- the first moment that does not belong to it
+  purpose TEXT NOT NULL,
+  made_by TEXT NOT NULL,                    -- the actor
+  made_at_us INTEGER NOT NULL,
+  cancelled_at_us INTEGER,                  -- NULL: it is not
+  cancelled_by TEXT NOT NULL DEFAULT ''     -- the actor
+);
+CREATE INDEX reservation_by_robot ON reservation(robot_id, until_us);
+CREATE TRIGGER reservation_never_overlaps BEFORE INSERT ON reservation
+WHEN EXISTS (SELECT 1 FROM reservation WHERE robot_id = NEW.robot_id AND cancelled_at_us IS NULL
+  AND from_us < NEW.until_us AND NEW.from_us < until_us)
+BEGIN SELECT RAISE(ABORT, 'reservations of one robot never overlap'); END;
