@@ -1,4 +1,5 @@
 // Experiments on a real robot core: exact times, recorded duties, the queue of a robot, what people do with them.
+#include "tests/robot_fw/controllers.hpp"
 #include "tests/system/experiment_fixture.hpp"
 
 #include "server/experiments/profile_document.hpp"
@@ -194,6 +195,32 @@ TEST_F(ExperimentsTest, WaitsForThePersonWhoChangesTheFluid) {
   ASSERT_TRUE(wait_for(experiments->resume(id, {"anna", "", 0})));
   const storage::Experiment ended = until(id, ExperimentState::done);
   EXPECT_EQ(wait_for(runs->find(*ended.runs.at(1).run))->conditions.fluid, "water");
+}
+
+// SAFETY: a robot that was switched off while the fluid was changed never goes on with another controller.
+TEST_F(ExperimentsTest, AllRunsHaveTheControllerOfTheFirst) {
+  come("anna");
+  const auto sent = command_by("anna", sim_robot::set_controller(robot_fw::biquad_controller()));
+  ASSERT_TRUE(sent) << sent.error().detail;
+  const auto id = start(profile({kSetpoint}, "[sweep]\nfluids = [\"non_newtonian\", \"water\"]\n"));
+  until(id, ExperimentState::paused);
+  const auto before = std::move(robot);
+  sim_robot::SimulatedRobotConfig rebooted;
+  rebooted.boot_id = 2;
+  robot = std::make_unique<VirtualRobot>(loop, clock, tasks, rebooted);
+  robot->dial(*listener);
+  ASSERT_TRUE(clock.run_until([&] { return state().boot_id == 2 && state().sample; }, 5s));
+  ASSERT_TRUE(station.set_fluid("sim-1", "water", {"anna", "", clock.utc_us()}));
+  ASSERT_TRUE(wait_for(experiments->resume(id, {"anna", "", 0})));
+  ASSERT_TRUE(clock.run_until([&] { return view(id).experiment.reason == "other_controller"; }, 10s));
+  ASSERT_TRUE(wait_for(experiments->resume(id, {"anna", "", 0})));
+  clock.run_for(10s);
+  EXPECT_EQ(view(id).experiment.state, ExperimentState::paused) << "it still is another one";
+  EXPECT_EQ(robot->simulated().motor_duty(), 0);
+  ASSERT_TRUE(command_by("anna", sim_robot::set_controller(robot_fw::biquad_controller())));
+  clock.run_for(1s);
+  ASSERT_TRUE(wait_for(experiments->resume(id, {"anna", "", 0})));
+  EXPECT_EQ(until(id, ExperimentState::done).runs.size(), 2U);
 }
 
 TEST_F(ExperimentsTest, WaitsForThePersonWhoSetsThePumpAndNobodyIsAskedTwice) {

@@ -118,6 +118,7 @@ inline constexpr Limit<std::int64_t> kIntegerLimits[] = {
     {"IdentifyJobBody.span", {0, 1'000'000}},
     {"IdentifyJobBody.validation_run_id", {1, kMaxJavaScriptInteger}},
     {"IdentifyJobBody.validation_span", {0, 1'000'000}},
+    {"KeepAliveBody.stamp_us", {0, kMaxTimeUs}},
     {"IssuedAtUs", {0, kMaxTimeUs}},
     {"LifeMs", {1, protocol::kMaxTimeToLiveUs / 1000}},
     {"MarkerBody.at_us", {0, kMaxTimeUs - 1}},

@@ -128,6 +128,15 @@ Result<std::string> parse_abort(const std::string& text) {
   return body->text("reason", text_bytes("ExperimentAbortBody.reason"));
 }
 
+Result<std::optional<std::int64_t>> parse_keep_alive(const std::string& text) {
+  std::optional<std::int64_t> stamp_us;
+  if (text.empty()) return stamp_us;
+  const auto body = Members::parse(text, {"stamp_us"});
+  if (!body) return std::unexpected{body.error()};
+  if (auto read = body->time("stamp_us", stamp_us); !read) return std::unexpected{read.error()};
+  return stamp_us;
+}
+
 Result<MoveBody> parse_move(const std::string& text) {
   const auto body = Members::parse(text, {"before", "priority"});
   if (!body) return std::unexpected{body.error()};

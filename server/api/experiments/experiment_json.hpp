@@ -16,7 +16,8 @@ nlohmann::json to_json(const experiments::ExperimentView& view);  // the same wi
 // a JSON object. not_found for a name that is none.
 Result<storage::ExperimentRequest> parse_experiment(const std::string& text);
 
-Result<std::string> parse_abort(const std::string& text);  // the reason; an empty body has none
+Result<std::optional<std::int64_t>> parse_keep_alive(const std::string& text);  // {"stamp_us": …}; or nothing
+Result<std::string> parse_abort(const std::string& text);                       // the reason; an empty body has none
 
 struct MoveBody {
   storage::ExperimentId before = 0;  // 0: to the end

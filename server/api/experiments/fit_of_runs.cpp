@@ -16,7 +16,7 @@ using nlohmann::json;
 
 namespace {
 
-constexpr double kSearchFor_s = 60;
+constexpr double kSearchFor_s = 300;  // at most; some seconds are usual
 constexpr microseconds kLook = 200ms;
 
 asio::awaitable<Result<storage::Job>> await_job(FitParts parts, storage::JobId id, FitRequest request) {

@@ -27,10 +27,10 @@ Result<storage::ExperimentId> experiment_id_of(const http::Request& request) {
   return fail(ErrorCode::not_found, fmt::format("there is no experiment '{}'", given), "no_such_experiment");
 }
 
-// SAFETY: what a script asks for is a sign of life of it, as old as the request; a page gives its own by the stamps on
-// /live.
-void note_sign_of_life(const ExperimentRoutes& parts, const http::Request& request) {
-  if (request.caller.session == 0) parts.station.keep_control(request.actor, request.unread);
+// SAFETY: what a script asks for is a sign of life of it, as old as the request or as what it has seen of the station;
+// a page gives its own by the stamps on /live.
+void note_sign_of_life(const ExperimentRoutes& parts, const http::Request& request, microseconds age = {}) {
+  if (request.caller.session == 0) parts.station.keep_control(request.actor, std::max(request.unread, age));
 }
 
 http::Response view_response(int status, const Result<experiments::ExperimentView>& view) {
@@ -104,14 +104,22 @@ http::Answer get_prediction(ExperimentRoutes parts, http::Request request) {
 http::Answer keep_alive(ExperimentRoutes parts, http::Request request) {
   const auto id = experiment_id_of(request);
   if (!id) co_return http::problem(id.error());
+  const auto stamp_us = parse_keep_alive(request.body);
+  if (!stamp_us) co_return http::problem(stamp_us.error());
+  const std::int64_t now_us = parts.clock.steady_us();
+  if (*stamp_us && **stamp_us > now_us) {
+    co_return http::problem(422, "stamp_us is none that an answer to keep-alive has had", "out_of_range");
+  }
   const auto view = parts.experiments.summary(*id);
   if (!view) co_return http::problem(409, "it has ended", "wrong_state");
   const std::string& actor = view->experiment.acts_for;
   if (actor != request.actor) {
     co_return http::problem(409, fmt::format("it acts in the name of {}", actor), "acts_for_another");
   }
-  note_sign_of_life(parts, request);
-  co_return http::json_response(200, summary_json(*view));
+  note_sign_of_life(parts, request, microseconds{*stamp_us ? now_us - **stamp_us : 0});
+  json out = summary_json(*view);
+  out["stamp_us"] = now_us;
+  co_return http::json_response(200, std::move(out));
 }
 
 http::Answer pause_experiment(ExperimentRoutes parts, http::Request request) {

@@ -135,11 +135,13 @@ json watch(const StationClient& station, std::int64_t id) {
   Interrupt interrupt;
   const std::string one = fmt::format("{}/{}", kExperiments, id);
   bool is_interrupted = false;
+  json seen = json::object();  // SAFETY: a sign of life is as old as what this tool has seen of the station
   for (;;) {
     // A sign of life, answered without the runs. Refused when it has ended, or when somebody has taken it over: then it
     // is theirs.
-    const StationAnswer kept = is_interrupted ? StationAnswer{} : station.ask("POST", one + "/keep-alive");
+    const StationAnswer kept = is_interrupted ? StationAnswer{} : station.ask("POST", one + "/keep-alive", seen);
     const bool is_ours = kept.status == 200;
+    if (is_ours) seen["stamp_us"] = kept.body.at("stamp_us");
     json experiment = is_ours ? kept.body : ask_experiments(station, "GET", one);
     progress.show(experiment);
     if (is_over(experiment)) {

@@ -43,9 +43,11 @@ json StationWork::finished_job(std::int64_t job_id) const {
 
 json StationWork::finished_experiment(std::int64_t experiment_id) const {
   const std::string target = fmt::format("/api/v1/experiments/{}", experiment_id);
+  json seen = json::object();  // SAFETY: a sign of life is as old as what this tool has seen of the station
   for (;;) {
     // Refused for one that has just ended, which the next look shows.
-    (void)ask_("POST", target + "/keep-alive", json::object());
+    const StationAnswer kept = ask_("POST", target + "/keep-alive", seen);
+    if (kept.status == 200 && kept.body.contains("stamp_us")) seen["stamp_us"] = kept.body.at("stamp_us");
     json experiment = get(fmt::format("{}?wait_ms={}", target, kLook_ms));
     on_look_(experiment);
     if (has_ended(experiment)) return experiment;

@@ -13,7 +13,9 @@ Result<FittedModel> fitted_model_from(storage::JobId job, const json& result) {
     const auto model = analysis::model_from(result.at("parameters"));
     if (!model) return std::unexpected{model.error()};
     fitted.model = *model;
-    for (std::size_t i = 0; i < control::kParameters; ++i) {
+    fitted.end = result.at("end").get<std::string>();
+    const bool is_optimum = fitted.end == analysis::text(control::SearchEnd::converged);
+    for (std::size_t i = 0; is_optimum && i < control::kParameters; ++i) {
       const json& sigma = result.at("one_sigma").at(control::kParameterNames[i]);
       if (sigma.is_number()) fitted.one_sigma[i] = sigma.get<double>();
     }
@@ -36,6 +38,7 @@ json to_json(const FittedModel& fitted) {
   return {{"job_id", fitted.job},
           {"parameters", json(analysis::json_of(fitted.model))},
           {"one_sigma", std::move(sigma)},
+          {"end", fitted.end},
           {"fit_percent", fitted.fit_percent},
           {"residual_sd", fitted.residual_sd},
           {"warnings", fitted.warnings}};

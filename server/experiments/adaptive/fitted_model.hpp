@@ -20,6 +20,8 @@ namespace server::experiments {
 struct FittedModel {
   storage::JobId job = 0;
   control::FractionalModel model;
+  std::string end;  // of the search, as in its result: "converged", or why it is not the optimum
+  // None of a parameter that is not determined, and of a search that has not converged: its sigmas say nothing.
   std::array<std::optional<double>, control::kParameters> one_sigma;
   double residual_sd = 0;
   bool is_of_acceleration = true;  // else of a position that was measured

@@ -58,11 +58,11 @@ asio::awaitable<Result<std::optional<Variant>>> UntilKnown::next(std::vector<sto
     knowledge_ = knowledge_of(*fitted, std::nullopt);
     const bool is_known = known.sigma && *known.sigma <= until.sigma;
     if (is_known) {
-      conclusion_ = Conclusion{"target_reached", state_in_words(known.sigma)};
+      conclusion_ = Conclusion{"target_reached", state_in_words(fitted)};
       co_return std::nullopt;
     }
     if (chosen_.size() >= profile_.most_runs) {
-      conclusion_ = Conclusion{"most_runs", state_in_words(known.sigma) + ", and the profile allows no more runs"};
+      conclusion_ = Conclusion{"most_runs", state_in_words(fitted) + ", and the profile allows no more runs"};
       co_return std::nullopt;
     }
   }
@@ -88,23 +88,26 @@ std::optional<Conclusion> UntilKnown::conclusion_of(const std::optional<FittedMo
   const std::optional<double> sigma = fitted ? fitted->one_sigma[until.parameter] : std::nullopt;
   if (!found.next) {
     return Conclusion{"target_out_of_reach",
-                      fmt::format("{}: no choice of the profile is allowed; {}: {}", state_in_words(sigma),
+                      fmt::format("{}: no choice of the profile is allowed; {}: {}", state_in_words(fitted),
                                   in_words(found.promises.front().variant), found.promises.front().forbidden)};
   }
   const bool can_tell = sigma && chosen_.size() >= kFewestRunsToGiveUp;
   if (!can_tell || !found.reachable_sigma || *found.reachable_sigma <= until.sigma) return std::nullopt;
   return Conclusion{"target_out_of_reach",
                     fmt::format("{}; {} more of the best choice that is allowed ({}) would bring it to {:.2g}{}",
-                                state_in_words(sigma), profile_.most_runs - chosen_.size(), in_words(*found.next),
+                                state_in_words(fitted), profile_.most_runs - chosen_.size(), in_words(*found.next),
                                 *found.reachable_sigma, forbidden_in_words(found))};
 }
 
-std::string UntilKnown::state_in_words(const std::optional<double>& sigma) const {
+std::string UntilKnown::state_in_words(const std::optional<FittedModel>& fitted) const {
   const Until& until = profile_.until.value();
   const char* parameter = control::kParameterNames[until.parameter];
   const std::string runs = chosen_.size() == 1 ? "1 run" : fmt::format("{} runs", chosen_.size());
-  if (!sigma) return fmt::format("{} is not determined after {}", parameter, runs);
-  return fmt::format("sigma({}) is {:.2g} after {}, wanted is {:g}", parameter, *sigma, runs, until.sigma);
+  const std::optional<double> sigma = fitted ? fitted->one_sigma[until.parameter] : std::nullopt;
+  if (sigma) return fmt::format("sigma({}) is {:.2g} after {}, wanted is {:g}", parameter, *sigma, runs, until.sigma);
+  const bool has_converged = !fitted || fitted->end == "converged";
+  return fmt::format("{} is not determined after {}{}", parameter, runs,
+                     has_converged ? "" : fmt::format(" (the search ended by {})", fitted->end));
 }
 
 json UntilKnown::knowledge_of(const FittedModel& fitted, const std::optional<NextExcitation>& found) const {

@@ -40,7 +40,7 @@ class UntilKnown {
 
  private:
   std::optional<Conclusion> conclusion_of(const std::optional<FittedModel>& fitted, const NextExcitation& found) const;
-  std::string state_in_words(const std::optional<double>& sigma) const;
+  std::string state_in_words(const std::optional<FittedModel>& fitted) const;
   nlohmann::json knowledge_of(const FittedModel& fitted, const std::optional<NextExcitation>& found) const;
 
   const Profile& profile_;

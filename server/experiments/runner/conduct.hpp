@@ -27,6 +27,7 @@
 namespace server::experiments {
 
 inline constexpr microseconds kFluidWithin{3'600'000'000};  // for a person to change it, or to set the pump
+inline constexpr const char* kOtherController = "other_controller";
 
 // The controller of a name that a profile mentions, for this robot. Errors say what is wrong with the name.
 using ControllerByName =
@@ -65,7 +66,8 @@ class Conduct {
   const Conclusion* conclusion() const;  // of one with until that was not aborted: how it ended; else null
   const std::string& activity() const { return activity_; }  // while no run is under way, in words; or empty
   const RunDriver* driver() const { return driver_.get(); }
-  std::uint32_t number() const { return number_; }  // of the run, from 1
+  std::uint32_t number() const { return number_; }            // of the run, from 1
+  std::size_t steps() const { return of_run_.steps.size(); }  // of the run
   const std::vector<storage::ExperimentRun>& runs() const { return begun_; }
 
  private:
@@ -82,6 +84,7 @@ class Conduct {
   boost::asio::awaitable<void> await_flow();
   boost::asio::awaitable<void> await_actor();
   boost::asio::awaitable<void> await_resumption(microseconds limit = kLongestPause);
+  boost::asio::awaitable<void> await_same_controller();
   boost::asio::awaitable<void> await_model();
   boost::asio::awaitable<void> send_controller(std::string name);
   boost::asio::awaitable<void> go_to_start();
@@ -112,7 +115,8 @@ class Conduct {
   std::optional<Abort> abort_;
   std::optional<Abort> waiting_for_;  // paused while no driver is at work
   station::BootId boot_id_ = 0;
-  std::uint64_t sampled_until_us_ = 0;  // of the latest batch that arrived while no driver is at work, robot time
+  std::uint32_t controller_checksum_ = 0;  // of the first run
+  std::uint64_t sampled_until_us_ = 0;     // of the latest batch that arrived while no driver is at work, robot time
   bool is_resumed_ = false;
   std::uint32_t number_ = 0;
   std::vector<storage::ExperimentRun> begun_;

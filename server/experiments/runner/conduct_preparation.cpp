@@ -1,6 +1,7 @@
 // What precedes each run: the actor, control, the fluid, the flow, the controller, the model, the place of the robot.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 #include <utility>
 
@@ -36,6 +37,7 @@ asio::awaitable<void> Conduct::prepare(Variant variant) {
   if (!abort_) co_await await_fluid(variant.fluid);
   if (!abort_ && number_ == 1) co_await await_flow();  // one flow for the whole grid
   if (!abort_ && !variant.controller.empty()) co_await send_controller(variant.controller);
+  if (!abort_ && variant.controller.empty()) co_await await_same_controller();
   if (!abort_) co_await await_model();
   if (!abort_) co_await go_to_start();
 }
@@ -117,6 +119,25 @@ asio::awaitable<void> Conduct::await_flow() {
   is_resumed_ = false;
   waiting_for_ = Abort{"pump", std::move(*to_set)};
   co_await await_resumption(kFluidWithin);
+  if (!abort_) take_control();
+}
+
+// SAFETY: where the grid names no controllers, all runs have the one of the first. A robot that was switched off while
+// its fluid was changed may have forgotten it.
+asio::awaitable<void> Conduct::await_same_controller() {
+  if (number_ == 1) controller_checksum_ = robot().controller_checksum;
+  const bool is_used = std::ranges::any_of(profile_.steps, is_closed_loop, &Step::kind);
+  const std::int64_t ends_us = parts_.driver.clock.steady_us() + kFluidWithin.count();
+  while (!abort_ && is_used && robot().controller_checksum != controller_checksum_) {
+    is_resumed_ = false;
+    waiting_for_ = Abort{kOtherController,
+                         "the robot has another controller than in the first run, as after it was "
+                         "switched off: send it that one again, and resume"};
+    if (parts_.driver.clock.steady_us() > ends_us) abort(*waiting_for_);
+    co_await changed_.wait_until(parts_.driver.clock, parts_.driver.clock.steady_us() + kLook.count());
+  }
+  if (abort_ || !waiting_for_) co_return;
+  co_await await_resumption();
   if (!abort_) take_control();
 }
 

@@ -38,6 +38,23 @@ class ExperimentRoutesTest : public ApiTest {
   std::uint64_t next_seq_ = 0;
 };
 
+// SAFETY: a call that was delayed in a network, or a script that has seen nothing for long, keeps nothing moving.
+TEST_F(ExperimentRoutesTest, ASignOfLifeIsAsOldAsWhatTheScriptHasSeen) {
+  pass(1);
+  ASSERT_EQ(begin_one(rest(20)).status, 202);
+  const json first = ask("POST", "/api/v1/experiments/1/keep-alive").parsed();
+  const std::int64_t seen_us = station.seen_us("token:local").value();
+  clock.run_for(500ms);
+  const json stamp{{"stamp_us", first.at("stamp_us")}};
+  const Answered late = ask("POST", "/api/v1/experiments/1/keep-alive", stamp);
+  ASSERT_EQ(late.status, 200) << late.body;
+  EXPECT_EQ(station.seen_us("token:local"), seen_us) << "it is no sign of life";
+  ask("POST", "/api/v1/experiments/1/keep-alive", {{"stamp_us", late.parsed().at("stamp_us")}});
+  EXPECT_GT(station.seen_us("token:local"), seen_us);
+  EXPECT_EQ(ask("POST", "/api/v1/experiments/1/keep-alive", {{"stamp_us", 1LL << 60}}).status, 422) << "of no answer";
+  EXPECT_EQ(ask("POST", "/api/v1/experiments/1/keep-alive", {{"stamp", 1}}).status, 400);
+}
+
 TEST_F(ExperimentRoutesTest, IsQueuedRecordedAndShown) {
   pass(1);
   const Answered begun = begin_one(rest(1), {{"notes", "quiet"}, {"priority", 5}});

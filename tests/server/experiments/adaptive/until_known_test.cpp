@@ -53,6 +53,7 @@ class UntilKnownTest : public ::testing::Test {
   runtime::WorkerThread maths_{"maths"};
   Profile profile_ = parse_profile(kProfile, "test");
   std::optional<double> sigma_;
+  std::string end_ = "converged";
   std::optional<Error> fails_;
   std::vector<FitRequest> asked_;
   FitOfRuns fit_ = [this](FitRequest request) -> boost::asio::awaitable<Result<FittedModel>> {
@@ -60,6 +61,7 @@ class UntilKnownTest : public ::testing::Test {
     if (fails_) co_return std::unexpected{*fails_};
     FittedModel fitted;
     fitted.job = 7;
+    fitted.end = end_;
     fitted.model = control::kNonNewtonianModel;
     fitted.one_sigma[3] = sigma_;
     fitted.residual_sd = 0.05;
@@ -105,6 +107,13 @@ TEST_F(UntilKnownTest, MakesNoMoreRunsThanTheProfileAllows) {
   EXPECT_THAT(until_.conclusion()->detail, HasSubstr("alpha is not determined after 4 runs"));
 }
 
+TEST_F(UntilKnownTest, SaysThatTheSearchWasCutOff) {
+  end_ = "time_limit";
+  for (int i = 0; i < 4; ++i) ASSERT_TRUE(next().value()) << i;
+  EXPECT_FALSE(next().value());
+  EXPECT_THAT(until_.conclusion()->detail, HasSubstr("not determined after 4 runs (the search ended by time_limit)"));
+}
+
 TEST_F(UntilKnownTest, AFitThatFailsIsAnError) {
   next();
   fails_ = Error{ErrorCode::conflict, "the fit, job 3: no", "fit_failed"};
@@ -116,6 +125,7 @@ TEST_F(UntilKnownTest, AFitThatFailsIsAnError) {
 TEST(FittedModel, IsReadFromTheResultOfAJob) {
   json result = {{"parameters", {{"kp", 2}, {"b1", 0.1}, {"b2", 0.5}, {"b3", 1}, {"alpha", 1.7}, {"beta", 0.6}}},
                  {"one_sigma", {{"kp", 0.1}, {"b1", nullptr}, {"b2", 0.1}, {"alpha", 0.03}, {"beta", 0.01}}},
+                 {"end", "converged"},
                  {"residual_sd", 0.04},
                  {"fit_percent", 88},
                  {"warnings", {"one"}},
@@ -128,6 +138,8 @@ TEST(FittedModel, IsReadFromTheResultOfAJob) {
   EXPECT_TRUE(fitted->is_of_acceleration);
   result["runs"] = {{{"channels", {"position_m"}}}};
   EXPECT_FALSE(fitted_model_from(5, result)->is_of_acceleration) << "of several runs each has its channels";
+  result["end"] = "time_limit";
+  EXPECT_FALSE(fitted_model_from(5, result)->one_sigma[3]) << "of a search that was cut off nothing is known";
   result["residual_sd"] = nullptr;
   EXPECT_EQ(fitted_model_from(5, result).error().reason, "no_model");
   EXPECT_EQ(fitted_model_from(5, json{}).error().reason, "no_model");
