@@ -4,9 +4,9 @@
 //   waiting one
 //
 // SAFETY: nothing begins by itself. An experiment begins when the actor in whose name it acts is there (a page by its
-// stamps, a script by keep_alive()) and nobody else controls the robot; after an abort or a restart of the station what
-// waits is held until somebody releases it. At most kMostQueued wait. Abort, and what ends one, leaves the robot at
-// rest. Loop thread; what it is given outlives it.
+// stamps, a script by keep_alive()) and nobody else controls the robot, or has reserved it for that time; after an
+// abort or a restart of the station what waits is held until somebody releases it. At most kMostQueued wait. Abort, and
+// what ends one, leaves the robot at rest. Loop thread; what it is given outlives it.
 #pragma once
 
 #include <boost/asio/awaitable.hpp>

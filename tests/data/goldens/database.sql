@@ -1163,7 +1163,6 @@ BEGIN SELECT RAISE(ABORT, 'the sources of a design are never removed'); END;
 CREATE INDEX experiment_by_robot ON experiment(robot_id);
 CREATE INDEX experiment_not_ended ON experiment(state) WHERE ended_at_us IS NULL;
 CREATE INDEX experiment_needs_rest ON experiment(robot_id) WHERE needs_rest = 1;
-CREATE INDEX reservation_by_robot ON reservation(robot_id, until_us);
 CREATE TRIGGER reservation_never_overlaps BEFORE INSERT ON reservation
 WHEN EXISTS (SELECT 1 FROM reservation WHERE robot_id = NEW.robot_id AND cancelled_at_us IS NULL
   AND from_us < NEW.until_us AND NEW.from_us < until_us)

@@ -504,7 +504,6 @@ CREATE TABLE reservation (
   cancelled_at_us INTEGER,                  -- NULL: it is not
   cancelled_by TEXT NOT NULL DEFAULT ''     -- the actor
 );
-CREATE INDEX reservation_by_robot ON reservation(robot_id, until_us);
 CREATE TRIGGER reservation_never_overlaps BEFORE INSERT ON reservation
 WHEN EXISTS (SELECT 1 FROM reservation WHERE robot_id = NEW.robot_id AND cancelled_at_us IS NULL
   AND from_us < NEW.until_us AND NEW.from_us < until_us)
