@@ -204,6 +204,9 @@ TEST_F(ExperimentsTest, AllRunsHaveTheControllerOfTheFirst) {
   ASSERT_TRUE(sent) << sent.error().detail;
   const auto id = start(profile({kSetpoint}, "[sweep]\nfluids = [\"non_newtonian\", \"water\"]\n"));
   until(id, ExperimentState::paused);
+  robot->redial = false;
+  robot->cut();
+  clock.run_for(1s);
   const auto before = std::move(robot);
   sim_robot::SimulatedRobotConfig rebooted;
   rebooted.boot_id = 2;

@@ -69,7 +69,7 @@ TEST_F(ReservedExperimentTest, OneThatRunsIsAbortedAndItsRobotAtRestBeforeTheSlo
   EXPECT_EQ(duty(), 0);
   EXPECT_FALSE(state().latched()) << "brought to rest, not stopped";
   expect_aborted(id, "reserved");
-  EXPECT_EQ(view(waits).waits_for, "held") << "after an abort somebody looks first";
+  EXPECT_EQ(view(waits).waits_for, "reserved") << "it is somebody else's turn; nothing was wrong";
 }
 
 // An administrator reserves it from now on: its actor may command the robot no more, and it comes to rest all the same.

@@ -49,6 +49,7 @@ class UntilKnownExperiment : public ExperimentTest {
       fitted.model = control::kNonNewtonianModel;
       fitted.one_sigma[3] = 0.5;
       fitted.residual_sd = 0.05;
+      fitted.end = "converged";
       co_return fitted;
     });
   }

@@ -226,7 +226,7 @@ asio::awaitable<void> Experiments::finish(Entry& entry) {
   const station::RobotId robot_id = experiment.request.robot_id;
   const bool is_aborted = entry.end.has_value();
   const ExperimentId id = experiment.id;
-  if (is_aborted) co_await hold_queue(robot_id);
+  if (is_aborted && entry.end->reason != "reserved") co_await hold_queue(robot_id);  // else it is somebody's turn
   running_.erase(robot_id);
   entries_.erase(id);
   changed_.notify();
