@@ -10,7 +10,6 @@ stage did not end as it should or a sample was lost.
 import argparse
 import json
 import pathlib
-import re
 import subprocess
 import sys
 
@@ -21,7 +20,6 @@ ROBOT = "sim-1"
 SECOND_PRBS_FROM_S = 129  # of the identification set: not fitted, the model is tried on it
 MOST_ERROR_IN_WATER_M = 0.004
 PHASE_S = 20
-MOST_WINDOWS = 4
 PAPER_CONTROLLER = {"kp": 65.0028, "kd": 0.0305, "mu": 0.6524}
 PAPER_NAME = "equation (30)"
 
@@ -51,32 +49,17 @@ class Rheonaut:
         command = [self.program, *map(str, words), "--data", str(self.data)]
         return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 
-    def ended_job(self, request):
-        say("    " + json.dumps(request))
-        return json.loads(self.run("job", "begin", "-", "--wait", "--json", text=json.dumps(request), may_exit=(0, 5)))
-
     def job(self, request):
         """The whole job, once it is done."""
-        job = self.ended_job(request)
+        say("    " + json.dumps(request))
+        job = json.loads(self.run("job", "begin", "-", "--wait", "--json", text=json.dumps(request), may_exit=(0, 5)))
         if job["state"] != "done":
             raise Failed(f"job {job['job_id']} {job['state']}: {job['error']}")
         return job
 
     def identify(self, request):
-        """Where a busy machine made the simulated robot skip ticks: on the longest window that the station offers."""
-        for _ in range(MOST_WINDOWS):
-            job = self.ended_job(request)
-            windows = re.findall(r"--from-s ([0-9.]+) --to-s ([0-9.]+)", job["error"] or "")
-            if not windows:
-                break
-            say("  " + job["error"])
-            from_s, to_s = max(((float(a), float(b)) for a, b in windows), key=lambda window: window[1] - window[0])
-            in_validation = from_s >= request.get("validation_from_s", from_s + 1)
-            prefix = "validation_" if in_validation else ""
-            request = {**request, prefix + "from_s": from_s, prefix + "to_s": to_s}
-        if job["state"] != "done":
-            raise Failed(f"job {job['job_id']} {job['state']}: {job['error']}")
-        return job
+        """A busy machine makes the simulated robot skip ticks: then the longest part without a gap is fitted."""
+        return self.job({**request, "cut_at_gaps": True})
 
     def keep(self, kind, name, *where_from):
         """The number of the design."""

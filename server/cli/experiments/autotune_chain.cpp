@@ -139,7 +139,7 @@ bool AutotuneChain::identify() {
 
 json AutotuneChain::identify_body() const {
   const std::int64_t run = *state_.number(kIdentification, "run_id");
-  json body{{"kind", "identify"}, {"run_id", run}};
+  json body{{"kind", "identify"}, {"run_id", run}, {"cut_at_gaps", true}};
   if (request_.fit_to_s) body["to_s"] = *request_.fit_to_s;
   if (request_.validation_from_s) {
     body["validation_run_id"] = run;
