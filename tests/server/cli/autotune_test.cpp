@@ -322,7 +322,8 @@ TEST_F(AutotuneTest, ARunTakesThePlaceOfTheExperiment) {
   station.controller = nullptr;
   ASSERT_EQ(tune(), 0);
   EXPECT_EQ(station.count(kExperiments), 1);
-  EXPECT_EQ(station.body_of(kJobs), (json{{"kind", "identify"}, {"run_id", 12}, {"to_s", 30.0}}));
+  EXPECT_EQ(station.body_of(kJobs),
+            (json{{"kind", "identify"}, {"run_id", 12}, {"cut_at_gaps", true}, {"to_s", 30.0}}));
   EXPECT_FALSE(station.body_of(kJobs, 1).contains("duty_min")) << "the robot's range is not known";
   EXPECT_EQ(station.body_of(kJobs, 1)["mu"], 0.9);
   EXPECT_EQ(station.body_of(kPush)["confirm"], true);
