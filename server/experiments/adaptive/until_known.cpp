@@ -52,7 +52,7 @@ asio::awaitable<Result<std::optional<Variant>>> UntilKnown::next(std::vector<sto
                           control::kParameterNames[until.parameter] == std::string_view{"beta"};
     FitRequest request{std::move(runs), is_order, std::move(actor), std::move(is_wanted)};
     auto fit = co_await fit_(std::move(request));
-    if (!fit) co_return std::unexpected{fit.error()};
+    if (!fit) co_return fail(fit.error().code, fit.error().detail, "fit_failed");
     fitted = std::move(*fit);
     known = {fitted->model, fitted->one_sigma[until.parameter], fitted->residual_sd, fitted->is_of_acceleration};
     knowledge_ = knowledge_of(*fitted, std::nullopt);

@@ -77,7 +77,7 @@ asio::awaitable<std::optional<Variant>> Conduct::next_run() {
     co_await parts_.writer.keep("what an experiment knows", std::move(note));
   }
   if (!next) {
-    abort({next.error().reason.empty() ? "fit_failed" : next.error().reason, next.error().detail});
+    abort({next.error().reason, next.error().detail});
     co_return std::nullopt;
   }
   co_return *next;
