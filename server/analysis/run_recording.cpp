@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <ranges>
 #include <utility>
 
 #include "control/sensor/position_weight.hpp"
@@ -132,10 +133,12 @@ class Cut {
 
   bool is_whole() const { return faults_.empty(); }
 
-  // The longest window without a fault; none: each is too short.
+  // The longest window without a fault that begins at rest, as the model assumes; none: each is too short.
   std::optional<RunWindow> longest(const Piece& piece, RunWindow window) const {
-    if (parts_.empty()) return std::nullopt;
-    const Part& part = *std::ranges::max_element(parts_, {}, &Part::size);
+    Part part;
+    for (const Part& one : parts_) {
+      if (one.size() > part.size() && begins_at_rest(piece, one)) part = one;
+    }
     if (part.size() < kFewestSamples) return std::nullopt;
     window.span = piece.samples[part.begin].span;
     window.from_s = piece.seconds(piece.samples[part.begin]);
@@ -168,6 +171,15 @@ class Cut {
     std::size_t begin = 0, end = 0;
     std::size_t size() const { return end - begin; }
   };
+
+  // The piece's own beginning is the caller's choice.
+  static bool begins_at_rest(const Piece& piece, const Part& part) {
+    if (part.begin == 0) return true;
+    const double begins_s = piece.seconds(piece.samples[part.begin]);
+    return std::ranges::none_of(piece.samples | std::views::take(part.begin), [&](const storage::StoredSample& before) {
+      return begins_s - piece.seconds(before) <= kTimeToRest_s && !(before.sample.duty == 0);
+    });
+  }
 
   void end_part(std::size_t end, std::size_t next_begin, std::string why) {
     if (end > begin_) parts_.push_back({begin_, end});
@@ -281,10 +293,10 @@ Result<RunRecording> recording_of(std::span<const storage::StoredSample> samples
     if (!part) return cut.refusal(*piece);
     auto recorded = recording_of(samples, *part, reference, choice);
     if (recorded) {
-      recorded->warnings.push_back(
-          fmt::format("the recording has gaps: fitted is its longest part without one, from "
-                      "{:.3f} to {:.3f} s",
-                      part->from_s, part->to_s));
+      recorded->warnings.push_back(fmt::format(
+          "the recording has gaps: fitted is its longest part without one that begins at rest, from {:.3f} to "
+          "{:.3f} s",
+          part->from_s, part->to_s));
     }
     return recorded;
   }

@@ -23,7 +23,7 @@ struct RunWindow {
   double from_s = 0;
   double to_s = std::numeric_limits<double>::infinity();
   bool with_velocity = false;  // the robot's own estimate of it, which is no second measurement
-  bool cuts_at_gaps = false;   // the longest part without a gap, and a warning that says so; else a refusal
+  bool cuts_at_gaps = false;   // the longest part without a gap that begins at rest, and a warning; else a refusal
 };
 
 // From where motion is taken.

@@ -101,7 +101,7 @@ void ApiServer::add_routes(boost::asio::io_context& loop, station::Station& stat
   add_account_routes(router_, {accounts_, auth_, logins_, clock_, station, facts_});
   add_experiment_routes(router_, {clock_, experiments, station});
   connect_controllers(experiments, {analysis, recording.designs, station});
-  connect_fits(experiments, {analysis, recording.jobs});
+  connect_fits(experiments, {clock_, analysis, recording.jobs});
   experiments.set_on_change(
       [&live](const experiments::ExperimentView& view) { live.publish_experiment(summary_json(view)); });
   add_audit_routes(router_, {clock_, history, recording.recorder});

@@ -37,7 +37,7 @@ void apply(const Action& action, Commanded& commanded, control::SectionFilter& c
 std::string place(const Profile& profile, const TimeLine& line, std::size_t tick) {
   const auto after = std::ranges::upper_bound(line.step_begins, tick);
   const auto step = static_cast<std::size_t>(after - line.step_begins.begin()) - 1;
-  return fmt::format("after {:.2f} s, in step {} ({})", static_cast<double>(tick) * kTick_s, step + 1,
+  return fmt::format("after {:.2f} s, in step {} ({})", static_cast<double>(tick) * kTick_s, line.first_step + step,
                      step_kinds()[static_cast<std::size_t>(profile.steps[step].kind)]);
 }
 

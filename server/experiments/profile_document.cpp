@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
@@ -19,6 +18,7 @@
 #include "control/identification/three_tones.hpp"
 #include "server/experiments/duty_signals.hpp"
 #include "server/experiments/time_line.hpp"
+#include "server/experiments/until_rules.hpp"
 
 namespace server::experiments {
 namespace {
@@ -225,40 +225,13 @@ void check_newest_step(const Profile& profile) {
   if (!is_closed_loop(step.kind) && profile.is_unattended) {
     base::throw_invalid("a profile with unattended = true has only the steps setpoint, disturbance, scan and tones");
   }
-  const bool moves_by_duty = !is_closed_loop(step.kind) && step.kind != StepKind::rest;
-  if (profile.until && !moves_by_duty) {
-    base::throw_invalid("kind is ", step_kinds()[static_cast<std::size_t>(step.kind)], ", a profile with until has ",
-                        "only steps that excite the robot by a duty: duty, staircase, ramp, chirp, prbs, multisine");
-  }
+  if (profile.until) check_choice(step);
   if (!is_closed_loop(step.kind)) check_duty(step, profile);
   if (has_setpoint(step.kind)) check_setpoint(step, profile);
   const double duration_s = longest_duration_s(profile);
   if (duration_s > profile.limits.duration_max_s) {
     base::throw_invalid("with this step and its for_s a run takes ", duration_s, " s, limits.duration_max_s is ",
                         profile.limits.duration_max_s);
-  }
-}
-
-// "sigma(alpha) <= 0.02"
-Until until_from(const std::string& given) {
-  for (std::size_t i = 0; i < control::kParameterNames.size(); ++i) {
-    const std::string before = base::join_text("sigma(", control::kParameterNames[i], ") <= ");
-    if (!given.starts_with(before)) continue;
-    Until until{i, 0};
-    const char* end = given.data() + given.size();
-    const auto [read, error] = std::from_chars(given.data() + before.size(), end, until.sigma);
-    if (error == std::errc{} && read == end && until.sigma > 0 && std::isfinite(until.sigma)) return until;
-  }
-  base::throw_invalid("until is '", given,
-                      "', it must be like sigma(alpha) <= 0.02, of kp, b1, b2, alpha or beta, and ", "above 0");
-}
-
-void check_until(const Profile& profile) {
-  if (!profile.until) return;
-  const Sweep& sweep = profile.sweep;
-  if (sweep.repeats > 1 || !sweep.setpoint_factor.empty() || !sweep.fluids.empty() || !sweep.controllers.empty()) {
-    base::throw_invalid("a sweep has a profile with until = \"", text(*profile.until),
-                        "\": there it has duty_factor only");
   }
 }
 
@@ -301,6 +274,7 @@ void fields(base::Fields& all, Profile& profile) {
   });
   all.must([&] {
     if (profile.steps.empty()) base::throw_invalid("there is no [[step]]");
+    check_amount(profile);
   });
 }
 

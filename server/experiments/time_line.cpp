@@ -57,6 +57,7 @@ void add_tones(const Step& step, double factor, std::size_t index, TimeLine& lin
 TimeLine time_line_of(const Profile& all, const Variant& variant) {
   const Profile profile = profile_of_run(all, variant);
   TimeLine line;
+  line.first_step = std::max<std::size_t>(variant.step, 1);
   double setpoint_m = 0;
   bool is_auto = false;
   for (std::size_t index = 0; index < profile.steps.size(); ++index) {

@@ -25,6 +25,7 @@ struct TimeLine {
   std::vector<Action> actions;             // by tick; the last one sets duty 0 if a duty step ends the profile
   std::vector<std::uint64_t> step_begins;  // tick of each step of profile_of_run()
   std::uint64_t ticks = 0;                 // of the run
+  std::size_t first_step = 1;              // the number of its first step in the profile
   double duration_s() const { return static_cast<double>(ticks) * kTick_s; }
 };
 

@@ -19,7 +19,7 @@ class UntilKnownExperiment : public ExperimentTest {
  protected:
   UntilKnownExperiment() {
     clock.add_worker(recording->jobs.worker());
-    api::connect_fits(*experiments, {analysis_, recording->jobs});
+    api::connect_fits(*experiments, {clock, analysis_, recording->jobs});
     sim_robot::SimulatedRobotConfig config;
     config.world.imu.emplace();
     begin(std::move(config));

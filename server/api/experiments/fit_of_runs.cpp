@@ -17,13 +17,27 @@ using nlohmann::json;
 namespace {
 
 constexpr double kSearchFor_s = 300;  // at most; some seconds are usual
-constexpr microseconds kLook = 200ms;
+constexpr microseconds kLook = 200ms, kFitWithin = 15min;
 
-asio::awaitable<Result<storage::Job>> await_job(FitParts parts, storage::JobId id, FitRequest request) {
+asio::awaitable<Result<storage::Job>> await_job(FitParts parts, storage::JobId id, FitRequest request,
+                                                std::int64_t ends_us) {
   for (;;) {
     const auto job = co_await parts.jobs.wait_for(id, kLook);
     if (!job || has_ended(job->state)) co_return job;
-    if (!request.is_wanted()) static_cast<void>(co_await parts.jobs.cancel(id));
+    const bool is_wanted = request.is_wanted() && parts.clock.steady_us() < ends_us;
+    if (!is_wanted) static_cast<void>(co_await parts.jobs.cancel(id));
+  }
+}
+
+// Where others have filled the queue of jobs, it is asked again.
+asio::awaitable<Result<storage::Job>> begin_job(FitParts parts, storage::JobRequest wanted, storage::JobWork work,
+                                                FitRequest request, std::int64_t ends_us) {
+  for (;;) {
+    auto copy = wanted;
+    auto begun = co_await parts.jobs.begin(std::move(copy), work);
+    const bool may_wait = request.is_wanted() && parts.clock.steady_us() < ends_us;
+    if (begun || !may_wait) co_return begun;
+    co_await parts.clock.sleep_for(1s);
   }
 }
 
@@ -35,9 +49,10 @@ asio::awaitable<Result<FittedModel>> fit(FitParts parts, FitRequest request) {
     return analysis::identify_job(analysis, identify, std::nullopt, job);
   };
   storage::JobRequest wanted{body->kind, body->document, request.actor};
-  const auto begun = co_await parts.jobs.begin(std::move(wanted), std::move(work));
+  const std::int64_t ends_us = parts.clock.steady_us() + kFitWithin.count();
+  const auto begun = co_await begin_job(parts, std::move(wanted), std::move(work), request, ends_us);
   if (!begun) co_return std::unexpected{begun.error()};
-  const auto ended = co_await await_job(parts, begun->id, std::move(request));
+  const auto ended = co_await await_job(parts, begun->id, std::move(request), ends_us);
   if (!ended) co_return std::unexpected{ended.error()};
   if (ended->state != storage::JobState::done) {
     const std::string why = ended->error.empty() ? text(ended->state) : ended->error;

@@ -1,9 +1,14 @@
 // Gives the experiments with `until` their fits: each is a job `identify` of the station, as anybody could ask for it.
 //
-// All of what it works with outlives the experiments.
+// A fit ends within 15 minutes, its wait behind the jobs of others included. All of what it works with outlives the
+// loop's run().
 #pragma once
 
 #include <string>
+
+namespace server::runtime {
+class Clock;
+}  // namespace server::runtime
 
 namespace server::analysis {
 class AnalysisService;
@@ -21,6 +26,7 @@ struct FitRequest;
 namespace server::api {
 
 struct FitParts {
+  runtime::Clock& clock;
   analysis::AnalysisService& analysis;
   storage::Jobs& jobs;
 };

@@ -107,16 +107,15 @@ http::Answer keep_alive(ExperimentRoutes parts, http::Request request) {
   const auto stamp_us = parse_keep_alive(request.body);
   if (!stamp_us) co_return http::problem(stamp_us.error());
   const std::int64_t now_us = parts.clock.steady_us();
-  if (*stamp_us && **stamp_us > now_us) {
-    co_return http::problem(422, "stamp_us is none that an answer to keep-alive has had", "out_of_range");
-  }
   const auto view = parts.experiments.summary(*id);
   if (!view) co_return http::problem(409, "it has ended", "wrong_state");
   const std::string& actor = view->experiment.acts_for;
   if (actor != request.actor) {
     co_return http::problem(409, fmt::format("it acts in the name of {}", actor), "acts_for_another");
   }
-  note_sign_of_life(parts, request, microseconds{*stamp_us ? now_us - **stamp_us : 0});
+  // A stamp of the future is of an earlier boot of the machine: as old as can be.
+  const bool is_of_this_boot = !*stamp_us || **stamp_us <= now_us;
+  if (is_of_this_boot) note_sign_of_life(parts, request, microseconds{*stamp_us ? now_us - **stamp_us : 0});
   json out = summary_json(*view);
   out["stamp_us"] = now_us;
   co_return http::json_response(200, std::move(out));
@@ -170,7 +169,7 @@ http::Answer list_profiles(ExperimentRoutes, http::Request) {
     list.push_back({{"profile", shipped.name},
                     {"name", profile.name},
                     {"purpose", profile.purpose},
-                    {"runs", experiments::variants_of(profile).size()},
+                    {"runs", profile.until ? profile.most_runs : experiments::variants_of(profile).size()},
                     {"duration_s", experiments::longest_duration_s(profile)}});
   }
   co_return http::json_response(200, {{"profiles", std::move(list)}});

@@ -93,6 +93,11 @@ http::Answer make_reservation(ReservationRoutes parts, http::Request request) {
   if (!checked) co_return http::problem(checked.error());
   const auto made = co_await parts.reservations.store(std::move(*wanted), author_of(request, parts.clock));
   if (!made) co_return http::problem(made.error());
+  // SAFETY: somebody may have taken control meanwhile, and nobody loses it without notice.
+  if (const auto still = parts.station.check_reservation(*made, is_admin(request)); !still) {
+    static_cast<void>(co_await parts.reservations.cancel(made->id, author_of(request, parts.clock)));
+    co_return http::problem(still.error());
+  }
   parts.station.add_reservation(*made);
   co_return http::json_response(201, live::to_json(*made));
 }
@@ -119,9 +124,10 @@ http::Answer cancel_reservation(ReservationRoutes parts, http::Request request) 
   const auto id = reservation_id_of(request);
   if (!id) co_return http::problem(id.error());
   // SAFETY: it keeps others from commanding until it is cancelled by whom it belongs to, or by an administrator.
-  const Reservation* reservation = parts.station.find_reservation(*id);
-  const bool is_own = reservation != nullptr && reservation->holder == parts.station.account_of(request.actor);
-  if (reservation != nullptr && !is_own && !is_admin(request)) {
+  const auto reservation = co_await parts.reservations.find(*id);
+  if (!reservation) co_return http::problem(404, fmt::format("there is no reservation {}", *id), "no_such_reservation");
+  const bool is_own = reservation->holder == parts.station.account_of(request.actor);
+  if (!is_own && !is_admin(request)) {
     co_return http::problem(403, fmt::format("only {} or an administrator cancels it", reservation->holder),
                             "not_permitted");
   }

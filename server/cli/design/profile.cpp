@@ -46,10 +46,11 @@ std::vector<Predicted> predict(const Profile& profile, const ProfileQuestion& op
     PlantChoice plant = options.plant;
     if (!plant.file && variant.fluid == "water") plant.file = "newtonian";
     TimeLine line = experiments::time_line_of(profile, variant);
-    Preview preview = experiments::preview_of(profile, line, read(plant), sections);
+    const Profile of_run = experiments::profile_of_run(profile, variant);
+    Preview preview = experiments::preview_of(of_run, line, read(plant), sections);
     std::vector<double> sd_m;
     if (const auto uncertainty = read_uncertainty(plant)) {
-      sd_m = experiments::position_sd_of(profile, line, read(plant), *uncertainty, sections);
+      sd_m = experiments::position_sd_of(of_run, line, read(plant), *uncertainty, sections);
     }
     runs.push_back({variant, std::move(line), std::move(preview), std::move(sd_m)});
   }
@@ -71,6 +72,7 @@ OrderedJson json_of(const Predicted& run) {
           {"duty_factor", run.variant.duty_factor},
           {"setpoint_factor", run.variant.setpoint_factor},
           {"repeat", run.variant.repeat},
+          {"step", run.variant.step == 0 ? OrderedJson(nullptr) : OrderedJson(run.variant.step)},
           {"duration_s", run.line.duration_s()},
           {"actions", run.line.actions.size()},
           {"position_min_m", preview.position_min_m},
@@ -84,8 +86,8 @@ OrderedJson json_of(const Predicted& run) {
 OrderedJson steps_json(const Profile& profile, const TimeLine& line) {
   OrderedJson steps = OrderedJson::array();
   for (std::size_t i = 0; i < profile.steps.size(); ++i) {
-    steps.push_back({{"kind", kind_text(profile.steps[i])},
-                     {"begins_s", static_cast<double>(line.step_begins[i]) * experiments::kTick_s}});
+    const double begins_s = profile.until ? 0 : static_cast<double>(line.step_begins[i]) * experiments::kTick_s;
+    steps.push_back({{"kind", kind_text(profile.steps[i])}, {"begins_s", begins_s}});
   }
   return steps;
 }
@@ -102,6 +104,7 @@ void write_json(std::ostream& out, const Profile& profile, const std::vector<Pre
   const bool is_known = !chosen.position_sd_m.empty();
   cli::write_json(out, {{"name", profile.name},
                         {"purpose", profile.purpose},
+                        {"until", profile.until ? OrderedJson(text(*profile.until)) : OrderedJson(nullptr)},
                         {"steps", steps_json(profile, chosen.line)},
                         {"runs", std::move(all)},
                         {"t_s", preview.time_s},
@@ -113,9 +116,35 @@ void write_json(std::ostream& out, const Profile& profile, const std::vector<Pre
                         {"ignores_flow", profile.conditions.pump != experiments::PumpFlow::off}});
 }
 
+void write_problems(std::ostream& out, const std::vector<Predicted>& runs) {
+  for (std::size_t i = 0; i < runs.size(); ++i) {
+    for (const std::string& problem : runs[i].preview.problems) fmt::print(out, "run {}: {}\n", i + 1, problem);
+  }
+}
+
+// What each run of a profile with until may be.
+void write_choices(std::ostream& out, const Profile& profile, const std::vector<Predicted>& runs) {
+  Table table{{"run", "step", "<kind", "duty ×", "duration (s)", "from (m)", "to (m)", "± 2 sd (m)", "travel (m)"}};
+  for (std::size_t i = 0; i < runs.size(); ++i) {
+    const auto& [variant, line, preview, position_sd_m] = runs[i];
+    const auto sd_m = largest_sd_m(runs[i]);
+    table.row({std::to_string(i + 1), std::to_string(variant.step), kind_text(profile.steps[variant.step - 1]),
+               cell(variant.duty_factor), fixed(line.duration_s(), 2), fixed(preview.position_min_m, 3),
+               fixed(preview.position_max_m, 3), sd_m ? fmt::format("{:.2g}", 2 * *sd_m) : "-",
+               fixed(preview.travel_m, 3)});
+  }
+  table.write(out);
+  write_problems(out, runs);
+}
+
 void write_table(std::ostream& out, const Profile& profile, const std::vector<Predicted>& runs) {
   fmt::print(out, "{}\n{}\n\n", one_line(profile.name), one_line(profile.purpose));
   Table steps{{"step", "<kind", "begins (s)"}};
+  if (profile.until) {
+    fmt::print(out, "Until {}, at most {} runs. Each performs one of these:\n\n", text(*profile.until),
+               profile.most_runs);
+    return write_choices(out, profile, runs);
+  }
   for (std::size_t i = 0; i < profile.steps.size(); ++i) {
     const double begins_s = static_cast<double>(runs.front().line.step_begins[i]) * experiments::kTick_s;
     steps.row({std::to_string(i + 1), kind_text(profile.steps[i]), fixed(begins_s, 2)});
@@ -134,9 +163,7 @@ void write_table(std::ostream& out, const Profile& profile, const std::vector<Pr
                fixed(preview.travel_m, 3)});
   }
   table.write(out);
-  for (std::size_t i = 0; i < runs.size(); ++i) {
-    for (const std::string& problem : runs[i].preview.problems) fmt::print(out, "run {}: {}\n", i + 1, problem);
-  }
+  write_problems(out, runs);
   if (profile.conditions.pump == experiments::PumpFlow::off) return;
   fmt::print(out, "The prediction is without the flow of the pump ({}, mean {} m/s).\n",
              experiments::pump_flows()[static_cast<std::size_t>(profile.conditions.pump)],

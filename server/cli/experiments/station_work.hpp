@@ -14,7 +14,7 @@
 
 namespace server::cli {
 
-inline constexpr int kLook_ms = 100;  // signs of life are needed every 200 ms
+inline constexpr int kLook_ms = 50;  // signs of life are needed every 150 ms
 
 using AskStation =
     std::function<StationAnswer(const std::string& method, const std::string& target, const nlohmann::json& body)>;

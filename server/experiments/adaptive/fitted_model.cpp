@@ -24,6 +24,11 @@ Result<FittedModel> fitted_model_from(storage::JobId job, const json& result) {
     const json& of_channels = result.contains("runs") ? result.at("runs").at(0) : result;
     fitted.is_of_acceleration = of_channels.at("channels").at(0) == "acceleration_m_s2";
     fitted.warnings = result.at("warnings").get<std::vector<std::string>>();
+    for (const json& run : result.value("runs", json::array())) {  // of one run each
+      for (const json& warning : run.value("warnings", json::array())) {
+        fitted.warnings.push_back("run " + run.value("run_id", json()).dump() + ": " + warning.get<std::string>());
+      }
+    }
     return fitted;
   } catch (const json::exception& error) {
     return fail(ErrorCode::invalid, std::string{"the result of the fit cannot be read: "} + error.what(), "no_model");

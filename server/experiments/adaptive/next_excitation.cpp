@@ -20,11 +20,9 @@ control::PlannedExperiment planned(const std::vector<double>& duty, const Known&
   return experiment;
 }
 
-// What one of the choices does, and tells.
-struct Candidate {
-  control::ExpectedInformation information;
-  std::string forbidden;
-};
+bool is_same(const Variant& a, const Variant& b) { return a.step == b.step && a.duty_factor == b.duty_factor; }
+
+}  // namespace
 
 Candidate candidate_of(const Profile& profile, const Variant& variant, const Known& known) {
   Candidate candidate{control::ExpectedInformation{known.model}, ""};
@@ -35,16 +33,10 @@ Candidate candidate_of(const Profile& profile, const Variant& variant, const Kno
   return candidate;
 }
 
-bool is_same(const Variant& a, const Variant& b) { return a.step == b.step && a.duty_factor == b.duty_factor; }
-
-}  // namespace
-
-NextExcitation next_excitation(const Profile& profile, const std::vector<Variant>& done, const Known& known) {
+NextExcitation next_excitation(const Profile& profile, const std::vector<Variant>& done, const Known& known,
+                               const std::vector<Candidate>& candidates) {
   const std::size_t parameter = profile.until.value().parameter;
   const std::vector<Variant> choices = variants_of(profile);
-  std::vector<Candidate> candidates;
-  for (const Variant& variant : choices) candidates.push_back(candidate_of(profile, variant, known));
-
   control::ExpectedInformation so_far{known.model};
   for (const Variant& run : done) {
     const auto choice = std::ranges::find_if(choices, [&run](const Variant& one) { return is_same(one, run); });
@@ -52,28 +44,28 @@ NextExcitation next_excitation(const Profile& profile, const std::vector<Variant
   }
   const std::optional<double> expected = so_far.uncertainty().one_sigma[parameter];
   const double scale = known.sigma && expected ? *known.sigma / *expected : 1;
-  const auto sigma_after = [&](const Candidate& next, int times) -> std::optional<double> {
+  const auto sigma_after = [&](const control::ExpectedInformation& more, int times) -> std::optional<double> {
     control::ExpectedInformation all = so_far;
-    all.add(next.information, times);
+    all.add(more, times);
     const std::optional<double> sigma = all.uncertainty().one_sigma[parameter];
     return sigma ? std::optional{scale * *sigma} : std::nullopt;
   };
 
   NextExcitation found;
-  std::size_t best = choices.size();
+  control::ExpectedInformation allowed{known.model};
   for (std::size_t i = 0; i < choices.size(); ++i) {
-    found.promises.push_back({choices[i], sigma_after(candidates[i], 1), candidates[i].forbidden});
+    found.promises.push_back({choices[i], sigma_after(candidates[i].information, 1), candidates[i].forbidden});
     const Promise& promise = found.promises.back();
     if (!promise.forbidden.empty()) continue;
+    allowed.add(candidates[i].information);
     const bool is_better =
         !found.next || (promise.sigma && (!found.promised_sigma || *promise.sigma < *found.promised_sigma));
     if (!is_better) continue;
-    best = i;
     found.next = choices[i];
     found.promised_sigma = promise.sigma;
   }
   const int may_follow = static_cast<int>(profile.most_runs) - static_cast<int>(done.size());
-  if (found.next) found.reachable_sigma = sigma_after(candidates[best], may_follow);
+  if (found.next) found.reachable_sigma = sigma_after(allowed, may_follow);
   return found;
 }
 

@@ -17,6 +17,18 @@ constexpr std::size_t kFewestRunsToGiveUp = 2;
 
 json or_null(const std::optional<double>& value) { return value ? json(*value) : json(nullptr); }
 
+// The same, with what it throws as an error.
+template <class Work>
+auto guarded(Work work) {
+  return [work = std::move(work)]() -> Result<std::invoke_result_t<const Work&>> {
+    try {
+      return work();
+    } catch (const std::invalid_argument& error) {
+      return fail(ErrorCode::invalid, error.what(), "no_excitation");
+    }
+  };
+}
+
 std::string in_words(const Variant& variant) {
   return fmt::format("step {} at duty × {}", variant.step, variant.duty_factor);
 }
@@ -50,7 +62,7 @@ asio::awaitable<Result<std::optional<Variant>>> UntilKnown::next(std::vector<sto
   if (!runs.empty()) {
     const bool is_order = control::kParameterNames[until.parameter] == std::string_view{"alpha"} ||
                           control::kParameterNames[until.parameter] == std::string_view{"beta"};
-    FitRequest request{std::move(runs), is_order, std::move(actor), std::move(is_wanted)};
+    FitRequest request{std::move(runs), is_order, std::move(actor), is_wanted};
     auto fit = co_await fit_(std::move(request));
     if (!fit) co_return fail(fit.error().code, fit.error().detail, "fit_failed");
     fitted = std::move(*fit);
@@ -66,13 +78,17 @@ asio::awaitable<Result<std::optional<Variant>>> UntilKnown::next(std::vector<sto
       co_return std::nullopt;
     }
   }
-  auto choose = [profile = profile_, done = chosen_, known]() -> Result<NextExcitation> {
-    try {
-      return next_excitation(profile, done, known);
-    } catch (const std::invalid_argument& error) {
-      return fail(ErrorCode::invalid, error.what(), "no_excitation");
-    }
-  };
+  std::vector<Candidate> candidates;
+  for (const Variant& variant : variants_of(profile_)) {  // one after the other, since others wait for the worker
+    if (!is_wanted()) co_return fail(ErrorCode::conflict, "it is not wanted any more", "not_wanted");
+    auto compute = guarded([profile = profile_, variant, known] { return candidate_of(profile, variant, known); });
+    auto candidate = co_await maths_.run(std::move(compute));
+    if (!candidate) co_return std::unexpected{candidate.error()};
+    candidates.push_back(std::move(*candidate));
+  }
+  auto choose = guarded([profile = profile_, done = chosen_, known, candidates = std::move(candidates)] {
+    return next_excitation(profile, done, known, candidates);
+  });
   const Result<NextExcitation> found = co_await maths_.run(std::move(choose));
   if (!found) co_return std::unexpected{found.error()};
   if (fitted) knowledge_ = knowledge_of(*fitted, *found);
@@ -94,9 +110,9 @@ std::optional<Conclusion> UntilKnown::conclusion_of(const std::optional<FittedMo
   const bool can_tell = sigma && chosen_.size() >= kFewestRunsToGiveUp;
   if (!can_tell || !found.reachable_sigma || *found.reachable_sigma <= until.sigma) return std::nullopt;
   return Conclusion{"target_out_of_reach",
-                    fmt::format("{}; {} more of the best choice that is allowed ({}) would bring it to {:.2g}{}",
-                                state_in_words(fitted), profile_.most_runs - chosen_.size(), in_words(*found.next),
-                                *found.reachable_sigma, forbidden_in_words(found))};
+                    fmt::format("{}; even {} more of every choice that is allowed would bring it to {:.2g} only{}",
+                                state_in_words(fitted), profile_.most_runs - chosen_.size(), *found.reachable_sigma,
+                                forbidden_in_words(found))};
 }
 
 std::string UntilKnown::state_in_words(const std::optional<FittedModel>& fitted) const {

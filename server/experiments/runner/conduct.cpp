@@ -63,6 +63,8 @@ asio::awaitable<std::optional<Variant>> Conduct::next_run() {
     const std::vector<Variant> grid = variants_of(profile_);
     co_return number_ < grid.size() ? std::optional{grid[number_]} : std::nullopt;
   }
+  check_same_fluid();
+  if (abort_) co_return std::nullopt;
   std::vector<storage::RunId> runs;
   for (const storage::ExperimentRun& run : begun_) runs.push_back(run.run.value_or(0));
   if (!runs.empty()) activity_ = fmt::format("fitting a model to {} of its runs", runs.size());
@@ -87,9 +89,17 @@ const Conclusion* Conduct::conclusion() const {
   return until_ && until_->conclusion() ? &*until_->conclusion() : nullptr;
 }
 
+// With until one model is fitted to all runs, and a model is of one fluid.
+void Conduct::check_same_fluid() {
+  if (!until_ || begun_.empty() || robot().fluid == fluid_) return;
+  abort({"fluid", fmt::format("the robot is in '{}' now, and was in '{}' in the first run", robot().fluid, fluid_)});
+}
+
 asio::awaitable<void> Conduct::one_run(Variant variant) {
   co_await prepare(variant);
+  check_same_fluid();
   if (abort_) co_return;
+  fluid_ = robot().fluid;
   of_run_ = profile_of_run(profile_, variant);
   first_step_ = std::max<std::size_t>(variant.step, 1);
   auto make = [profile = profile_, variant] { return time_line_of(profile, variant); };

@@ -66,8 +66,8 @@ class Conduct {
   const Conclusion* conclusion() const;  // of one with until that was not aborted: how it ended; else null
   const std::string& activity() const { return activity_; }  // while no run is under way, in words; or empty
   const RunDriver* driver() const { return driver_.get(); }
-  std::uint32_t number() const { return number_; }            // of the run, from 1
-  std::size_t steps() const { return of_run_.steps.size(); }  // of the run
+  std::uint32_t number() const { return number_; }        // of the run, from 1
+  std::size_t first_step() const { return first_step_; }  // of the run, in the profile, from 1
   const std::vector<storage::ExperimentRun>& runs() const { return begun_; }
 
  private:
@@ -99,6 +99,7 @@ class Conduct {
   ModelInUse model_in_use() const;
   void take_control();
   void check_robot();
+  void check_same_fluid();
   bool is_actor_there() const;
   const station::RobotState& robot() const;
   std::string peer() const;
@@ -110,6 +111,7 @@ class Conduct {
   std::optional<UntilKnown> until_;  // of a profile with it
   Profile of_run_;                   // the present run's part of the profile, from this step on
   std::size_t first_step_ = 1;
+  std::string fluid_;  // of the runs so far
   std::string activity_;
   std::unique_ptr<RunDriver> driver_;  // null: none is at work
   std::optional<Abort> abort_;

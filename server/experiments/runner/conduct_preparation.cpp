@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "server/experiments/runner/conduct.hpp"
+#include "server/experiments/runner/limits_check.hpp"
 #include "server/experiments/runner/pump_flow.hpp"
 
 namespace server::experiments {
@@ -16,7 +17,6 @@ using nlohmann::json;
 namespace {
 
 constexpr microseconds kLook = 200ms, kModelWithin = 30s, kSamplesWithin = 3s;
-constexpr double kWayBack_s = 15;  // for a robot to go back to where its run begins
 
 // One setpoint, back to 0.
 Profile way_back() {

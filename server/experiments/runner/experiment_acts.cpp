@@ -40,8 +40,11 @@ Result<Experiments::Prepared> Experiments::prepare(const std::string& document, 
       return std::unexpected{allowed.error()};
     if (prepared.profile.until) {
       prepared.runs = static_cast<std::uint32_t>(prepared.profile.most_runs);
-      prepared.duration_s = prepared.runs * longest_duration_s(prepared.profile);
-      return prepared;  // it has no auto
+      const bool goes_back = prepared.profile.conditions.start == StartPosition::back;
+      const double between_s = kBetweenRuns_s + (goes_back ? kWayBack_s : 0);
+      prepared.duration_s = prepared.runs * (longest_duration_s(prepared.profile) + between_s);
+      prepared.longest_auto_s = goes_back ? kWayBack_s : 0;
+      return prepared;
     }
     for (const Variant& variant : variants_of(prepared.profile)) {
       ++prepared.runs;

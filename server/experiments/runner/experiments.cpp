@@ -313,8 +313,9 @@ ExperimentView Experiments::summary_of(const Entry& entry) const {
   }
   const RunDriver* driver = entry.conduct->driver();
   if (driver == nullptr || storage::has_ended(view.experiment.state)) return view;
-  view.progress = ExperimentProgress{entry.conduct->number(), entry.experiment.runs_planned, driver->step() + 1,
-                                     entry.conduct->steps(),  driver->elapsed_s(),           driver->duration_s()};
+  view.progress = ExperimentProgress{
+      entry.conduct->number(),    entry.experiment.runs_planned, entry.conduct->first_step() + driver->step(),
+      entry.profile.steps.size(), driver->elapsed_s(),           driver->duration_s()};
   return view;
 }
 

@@ -216,7 +216,8 @@ asio::awaitable<void> RunDriver::send(FedCommand fed, std::uint64_t robot_now_us
     co_return;
   }
   const std::string why = sent ? sent->reason.empty() ? text(sent->state) : sent->reason : sent.error().detail;
-  abort({"command_refused", fmt::format("step {}: {}: {}", fed.step + 1, protocol::kind(fed.command), why)});
+  abort({"command_refused",
+         fmt::format("step {}: {}: {}", line_.first_step + fed.step, protocol::kind(fed.command), why)});
 }
 
 void RunDriver::renew_lease() {

@@ -82,7 +82,7 @@ class RunDriver {
   bool is_paused() const { return pause_.has_value(); }
   const Abort* pause_reason() const { return pause_ ? &pause_->why : nullptr; }
   double elapsed_s() const;  // of the line
-  std::size_t step() const;  // that runs now
+  std::size_t step() const;  // that runs now, of the line from 0
   double duration_s() const { return line_.duration_s(); }
   const std::vector<StepBegin>& step_begins() const { return begins_; }
 

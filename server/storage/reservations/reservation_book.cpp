@@ -123,7 +123,9 @@ asio::awaitable<Result<Reservation>> ReservationBook::change(Job job) {
 }
 
 asio::awaitable<std::vector<Reservation>> ReservationBook::load() {
-  auto job = [utc_us = clock_.utc_us()](Database& database) {
+  // And those that are over for less than a day: the clock may be ahead.
+  const std::int64_t utc_us = clock_.utc_us() - std::chrono::microseconds{std::chrono::days{1}}.count();
+  auto job = [utc_us](Database& database) {
     ReservationFilter not_over;
     not_over.is_over = false;
     not_over.limit = kMaxKeptReservations;

@@ -13,6 +13,15 @@ using ::testing::StartsWith;
 
 class ProfileTool : public ToolTest {};
 
+TEST_F(ProfileTool, WithUntilItShowsWhatEachRunMayBe) {
+  const Answer answer = ask("profile orders");
+  EXPECT_THAT(answer.out, HasSubstr("Until sigma(alpha) <= 0.02, at most 6 runs. Each performs one of these:"));
+  EXPECT_THAT(answer.out, HasSubstr("5       3  chirp           1         30.00"));
+  const auto json = ask("profile orders --json").json();
+  EXPECT_EQ(json["until"], "sigma(alpha) <= 0.02");
+  EXPECT_EQ(json["runs"][4]["step"], 3);
+}
+
 TEST_F(ProfileTool, EveryProfileOfTheProgramStaysWithinItsLimits) {
   const auto list = ask("profile --json").json()["profiles"];
   ASSERT_EQ(list.size(), experiments::shipped_profiles().size());

@@ -220,6 +220,30 @@ TEST_F(RunTools, IdentifyDistinguishesARobotThatRanLateFromLostSamples) {
   EXPECT_NE(ask("identify --run 1 --from-s 1.58 --to-s 3.57 --structure first_order").exit_code, 1);
 }
 
+// The longer part begins under way, where the model is not at rest.
+TEST_F(RunTools, CutAtGapsTakesTheLongestPartThatBeginsAtRest) {
+  begin();
+  swim(100, 0.3);
+  robot_.late_us = 60'000;
+  swim(200, 0.3);
+  flush();
+  const ToolAnswer answer = ask("identify --run 1 --cut-at-gaps --structure first_order");
+  EXPECT_NE(answer.exit_code, 1) << answer.error;
+  EXPECT_THAT(answer.error, HasSubstr("its longest part without one that begins at rest, from 0.000 to 0.990 s"));
+}
+
+TEST_F(RunTools, CutAtGapsTakesALaterPartAfterARest) {
+  begin();
+  swim(50, 0.3);
+  swim(550, 0);
+  robot_.late_us = 60'000;
+  swim(700, -0.3);
+  flush();
+  const ToolAnswer answer = ask("identify --run 1 --cut-at-gaps --structure first_order");
+  EXPECT_NE(answer.exit_code, 1) << answer.error;
+  EXPECT_THAT(answer.error, HasSubstr("from 6.050 to"));
+}
+
 TEST_F(RunTools, IdentifyWarnsOfAWindowThatBeginsInMotion) {
   begin();
   swim(100, 0);

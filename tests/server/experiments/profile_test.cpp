@@ -67,6 +67,20 @@ TEST(Profile, AnUntilThatCannotBeIsRefused) {
               HasSubstr("kind is setpoint"));
 }
 
+// What could only fail after the robot was driven for long is refused before.
+TEST(Profile, AnUntilThatNoFitCouldTakeIsRefused) {
+  const std::string until{kUntil};
+  EXPECT_THAT(error_of(until + "[limits]\nduration_max_s = 600\n[[step]]\nkind = \"duty\"\nduty = 0.01\nfor_s = 600\n"),
+              HasSubstr("one fit takes 200000"));
+  EXPECT_THAT(error_of(until + "[[step]]\nkind = \"duty\"\nduty = 0\nfor_s = 3\n"), HasSubstr("moves the robot"));
+  EXPECT_THAT(error_of(until + "[[step]]\nkind = \"duty\"\nduty = 0.1\nfor_s = 0.1\n"), HasSubstr("at least 0.2 s"));
+  EXPECT_THAT(error_of(until + "[sweep]\nduty_factor = [1, 0]\n" + kDuty), HasSubstr("duty_factor has 0"));
+  EXPECT_THAT(error_of(until + "[conditions]\nstart = \"here\"\n" + kDuty), HasSubstr("start is here"));
+  std::string many = until;
+  for (int i = 0; i < 51; ++i) many += kDuty;
+  EXPECT_THAT(error_of(many), HasSubstr("51 choices, allowed are 50"));
+}
+
 TEST(Profile, HasWhatItsDocumentSays) {
   const Profile profile = parse_profile(R"(
 name = "Mine"

@@ -95,8 +95,8 @@ TEST_F(UntilKnownTest, SaysWhyItCannotBeReached) {
   EXPECT_FALSE(next().value());
   EXPECT_EQ(until_.conclusion()->reason, "target_out_of_reach");
   EXPECT_THAT(until_.conclusion()->detail,
-              AllOf(HasSubstr("sigma(alpha) is 0.5 after 2 runs"), HasSubstr("2 more of the best choice"),
-                    HasSubstr("step 1"), HasSubstr("would bring it to 0.35")));
+              AllOf(HasSubstr("sigma(alpha) is 0.5 after 2 runs"), HasSubstr("even 2 more of every choice"),
+                    HasSubstr("would bring it to 0.35 only")));
 }
 
 TEST_F(UntilKnownTest, MakesNoMoreRunsThanTheProfileAllows) {
