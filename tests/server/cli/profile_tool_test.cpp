@@ -15,8 +15,8 @@ class ProfileTool : public ToolTest {};
 
 TEST_F(ProfileTool, WithUntilItShowsWhatEachRunMayBe) {
   const Answer answer = ask("profile orders");
-  EXPECT_THAT(answer.out, HasSubstr("Until sigma(alpha) <= 0.02, at most 6 runs. Each performs one of these:"));
-  EXPECT_THAT(answer.out, HasSubstr("5       3  chirp           1         30.00"));
+  EXPECT_THAT(answer.text, HasSubstr("Until sigma(alpha) <= 0.02, at most 6 runs. Each performs one of these:"));
+  EXPECT_THAT(answer.text, HasSubstr("5       3  chirp           1         30.00"));
   const auto json = ask("profile orders --json").json();
   EXPECT_EQ(json["until"], "sigma(alpha) <= 0.02");
   EXPECT_EQ(json["runs"][4]["step"], 3);
