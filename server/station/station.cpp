@@ -45,6 +45,10 @@ void Station::restore(const std::vector<RestoredRobot>& robots, const std::vecto
     parts_->stops.restore(parts_->robots.add(record.robot_id), record);
   }
   for (const Reservation& reservation : reservations) parts_->control.reservations().add(reservation);
+  for (auto& [id, entry] : parts_->robots.entries()) {
+    const Reservation* running = parts_->control.reservations().running(id, parts_->clock.utc_us());
+    if (running != nullptr) entry.robot.reservation = *running;
+  }
 }
 
 const std::map<RobotId, RobotState>& Station::robots() const { return parts_->robots.states(); }

@@ -241,7 +241,7 @@ TEST_F(RunTools, CutAtGapsTakesALaterPartAfterARest) {
   flush();
   const ToolAnswer answer = ask("identify --run 1 --cut-at-gaps --structure first_order");
   EXPECT_NE(answer.exit_code, 1) << answer.error;
-  EXPECT_THAT(answer.error, HasSubstr("from 6.050 to"));
+  EXPECT_THAT(answer.error, HasSubstr("from 6.060 to"));
 }
 
 TEST_F(RunTools, IdentifyWarnsOfAWindowThatBeginsInMotion) {
