@@ -22,7 +22,7 @@ class SignsOfLife:
     def __init__(self, station):
         self.station = station
         self.ends = threading.Event()
-        self.thread = threading.Thread(target=self.run)
+        self.thread = threading.Thread(target=self.run, daemon=True)  # a test that fails ends
         self.thread.start()
 
     def run(self):
