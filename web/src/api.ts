@@ -18,6 +18,7 @@ export type ControlBody = Schemas['ControlBody'];
 export type EventRecord = Schemas['Event'];
 export type RunRecord = Schemas['Run'];
 export type Station = Schemas['Station'];
+export type Recording = Schemas['Recording'];
 export type Me = Schemas['Me'];
 export type User = Schemas['User'];
 export type Token = Schemas['Token'];
@@ -101,6 +102,7 @@ export class Api {
   };
 
   station = () => this.ask<Station>('GET', '/station');
+  recording = () => this.ask<Recording>('GET', '/recording');
   acknowledge_losses = () => this.ask<object>('POST', '/recording/losses/acknowledge');
   open_runs = async () => (await this.ask<{ runs: RunRecord[] }>('GET', '/runs?state=open&limit=1000')).runs;
   // null: the station has no list; then a fluid belongs to a run alone.

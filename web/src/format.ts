@@ -32,6 +32,14 @@ export const count = (value: number | null | undefined) =>
     ? kMissing
     : Math.round(value).toLocaleString('en').replaceAll(',', '\u202f').replace('-', kMinus);
 
+// Of a file or a disk: "640 kB", "12.4 GB".
+export function bytes(size: number): string {
+  const units = ['B', 'kB', 'MB', 'GB', 'TB'];
+  let [value, at] = [size, 0];
+  while (value >= 999.5 && at < units.length - 1) [value, at] = [value / 1000, at + 1];
+  return `${at === 0 || value >= 99.95 ? Math.round(value) : value.toFixed(1)} ${units[at]}`;
+}
+
 // The length a person typed in millimetres, in metres; null when it is no number. Comma and both minus signs are taken.
 export function parse_millimetres(text: string): number | null {
   const plain = text.trim().replace(kMinus, '-').replace(',', '.');

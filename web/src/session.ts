@@ -1,9 +1,10 @@
 // One running page: the store, the live link, the API and the controls that outlive a view, wired together.
 
-import { effect, signal } from '@preact/signals';
+import { effect, signal, untracked } from '@preact/signals';
 import { Api, type Fluid, type Me, type RunRecord, type Station } from './api';
 import { DutyHold } from './duty_hold';
 import { EmergencyStop, kIdleStop } from './emergency';
+import { go_to, route } from './route';
 import { LiveLink, type LinkPhase, type Surroundings } from './live';
 import { browser_shelf, ViewSettings } from './settings';
 import { kRefresh_ms, Store } from './store';
@@ -21,7 +22,6 @@ export class Session {
   readonly station = signal<Station | null>(null);
   readonly fluids = signal<Fluid[] | null>(null); // that a robot may be in; null: the station has no list of them
   readonly me = signal<Me | null>(null);
-  readonly shows_access = signal(false); // in place of the plots
   readonly phase = signal<LinkPhase>('connecting');
   readonly stop_state = signal(kIdleStop);
   readonly held = signal<{ robot_id: string | null; lapsed: boolean; error: string }>({
@@ -76,6 +76,7 @@ export class Session {
 
   start(): void {
     this.link.start();
+    effect(() => this.follow_route());
     effect(() => this.watch());
     effect(() => {
       const robot_id = this.store.selected_id.value;
@@ -90,6 +91,17 @@ export class Session {
     });
     addEventListener('blur', () => this.hold.release());
     addEventListener('pagehide', () => this.hold.release());
+  }
+
+  // The robot of the address is the one that is selected, and the one that is selected stands in the address.
+  private follow_route(): void {
+    const { view, parts } = route.value;
+    if (view !== 'robot') return;
+    const asked_id = parts[0];
+    // SAFETY: an address is followed when it changes, never because something else has: a press must not move the selection.
+    if (asked_id !== undefined) return untracked(() => this.store.want(asked_id));
+    const chosen_id = this.store.is_chosen.value ? this.store.selected_id.value : null;
+    if (chosen_id !== null) untracked(() => go_to({ view, parts: [chosen_id] }, true));
   }
 
   // Whatever is sent to a robot goes to the one that is selected, which stays so.
@@ -190,7 +202,6 @@ export class Session {
     this.phase.value = now;
     if (now === 'signed_out') {
       this.me.value = null;
-      this.shows_access.value = false;
     }
     if (before === 'live') {
       this.store.is_current.value = false;

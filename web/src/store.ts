@@ -37,7 +37,9 @@ export class Store {
   private readonly by_id = new Map<string, Robot>();
   private pending_log: LogLine[] = [];
   private notes = 0;
-  private chosen = false; // the selection stays: by a person, or because what is selected was there
+  // The selection stays: by a person, or because what is selected was there.
+  readonly is_chosen = signal(false);
+  private wanted_id = ''; // by the address of the page
 
   constructor(private readonly clocks: { page_ms(): number; utc_ms(): number }) {}
 
@@ -165,23 +167,33 @@ export class Store {
   }
 
   select(robot_id: string): void {
-    this.chosen = true;
-    this.selected_id.value = robot_id;
+    batch(() => {
+      this.is_chosen.value = true;
+      this.selected_id.value = robot_id;
+    });
+  }
+
+  // A robot that may not be known yet. SAFETY: it is selected at once, or while nothing else is: when it appears later, the
+  // stop button keeps the name that somebody may be about to press.
+  want(robot_id: string): void {
+    if (this.by_id.has(robot_id)) this.select(robot_id);
+    else this.wanted_id = robot_id;
   }
 
   // Whoever orders something of the robot that is selected has chosen it.
   keep_selected(): void {
-    this.chosen ||= this.selected_id.peek() !== null;
+    if (this.selected_id.peek() !== null) this.is_chosen.value = true;
   }
 
   // Until a person chooses, the page shows a connected robot rather than one that was never there.
   // SAFETY: one that was connected stays selected when its link breaks: Escape is meant for it, not for another one.
   private select_by_itself(): void {
-    if (this.chosen) return;
+    if (this.is_chosen.peek()) return;
+    if (this.by_id.has(this.wanted_id)) return this.select(this.wanted_id);
     const robots = this.robots.peek();
     const best = robots.find((robot) => !robot.is_away.peek()) ?? this.selected.peek() ?? robots[0];
     this.selected_id.value = best?.robot_id ?? null;
-    this.chosen = best !== undefined && !best.is_away.peek();
+    this.is_chosen.value = best !== undefined && !best.is_away.peek();
   }
 
   private line_of_event(event: EventRecord): LogLine {

@@ -4,6 +4,7 @@ import '@fontsource/b612/latin-400.css';
 import '@fontsource/b612/latin-700.css';
 import 'uplot/dist/uPlot.min.css';
 import './style/ground.css';
+import './style/shell.css';
 import './style/top_bar.css';
 import './style/panels.css';
 import './style/readouts.css';

@@ -33,7 +33,6 @@ function drawn_for(role: string, problems: string[]) {
     station,
     phase: signal('live'),
     me: signal({ role, user: 'anna', actor: 'user:anna/session:1' }),
-    shows_access: signal(false),
     link: { attempt: 0, lost_at_ms: null },
     api: { acknowledge_losses: () => Promise.resolve({}), station: () => Promise.resolve(station_with([])) },
   } as unknown as Session;

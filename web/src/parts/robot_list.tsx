@@ -6,6 +6,7 @@
 import { useComputed, useSignal } from '@preact/signals';
 import { millimetres, plus_minus } from '../format';
 import type { Robot } from '../robot';
+import { go_to } from '../route';
 import type { Session } from '../session';
 
 export function RobotList({ session }: { session: Session }) {
@@ -90,7 +91,7 @@ function RobotEntry({ session, robot }: { session: Session; robot: Robot }) {
       class="robot-entry"
       aria-pressed={store.selected_id.value === robot_id}
       data-tone={tone}
-      onClick={() => store.select(robot_id)}
+      onClick={() => go_to({ view: 'robot', parts: [robot_id] })}
     >
       <span class={`dot ${tone}`} />
       <span class="name">{robot_id}</span>

@@ -3,6 +3,8 @@
 import { age, duration } from '../format';
 import { stop_button_keys } from '../keys';
 import type { Session } from '../session';
+import { format, route } from '../route';
+import { kViews } from '../views/table';
 import { KeyList } from './key_list';
 import { LossBanner } from './loss_banner';
 
@@ -10,20 +12,14 @@ export function TopBar({ session }: { session: Session }) {
   const { store, station } = session;
   return (
     <header class="top-bar">
-      <a
-        class="wordmark"
-        href="/api/v1/station"
-        title="What the station says of itself"
-        target="_blank"
-        rel="noreferrer"
-      >
+      <a class="wordmark" href="#/robot" title={station.value ? `station ${station.value.version}` : ''}>
         <svg viewBox="0 0 34 20" aria-hidden="true">
           <path d="M1 12c4.5 0 4.5-8 9-8s4.5 8 9 8 4.5-8 9-8" />
           <circle cx="19" cy="12" r="3.4" />
         </svg>
         Rheonaut
       </a>
-      <span class="station quiet">{station.value ? `station ${station.value.version}` : ''}</span>
+      <Navigation session={session} />
       <ConnectionState session={session} />
       {station.value?.security.exposed && (
         <strong class="exposed" role="alert" title="tls.insecure is set: docs/operations.md says how to set up TLS">
@@ -60,26 +56,35 @@ export function TopBar({ session }: { session: Session }) {
   );
 }
 
+// A link to the robot keeps the one that is selected.
+export function Navigation({ session }: { session: Session }) {
+  const selected_id = session.store.selected_id.value;
+  return (
+    <nav class="views" aria-label="Views">
+      {kViews.map(({ name, title, key }) => (
+        <a
+          key={name}
+          id={`open-${name}`}
+          href={format({ view: name, parts: name === 'robot' && selected_id !== null ? [selected_id] : [] })}
+          aria-current={route.value.view === name ? 'page' : undefined}
+          title={`g ${key}`}
+        >
+          {title}
+        </a>
+      ))}
+    </nav>
+  );
+}
+
 function WhoIsIn({ session }: { session: Session }) {
   const me = session.me.value;
   if (!me) return null;
-  const { shows_access } = session;
   const leave = () => session.log_out().catch((error: Error) => session.store.note(error.message));
   return (
     <span class="who">
       <span id="who" title={me.actor}>
         {me.user || 'by link'} <span class="quiet">{me.role}</span>
       </span>
-      {me.role === 'admin' && (
-        <button
-          type="button"
-          id="show-access"
-          aria-pressed={shows_access.value}
-          onClick={() => (shows_access.value = !shows_access.value)}
-        >
-          {shows_access.value ? 'Back to the plots' : 'Access'}
-        </button>
-      )}
       <button type="button" id="log-out" onClick={() => void leave()}>
         Sign out
       </button>
