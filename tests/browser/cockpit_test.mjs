@@ -178,7 +178,8 @@ const steps = {
 
   async 'a killed station is waited for, and the page heals by itself'() {
     await bench.station.end('SIGKILL');
-    await page.locator('.top-bar .lamp.caution').waitFor();
+    await page.locator('#status.cut-off').waitFor();
+    await page.locator('#cut-off-frame').waitFor();
     await page.locator('.readouts.stale').waitFor();
     await bench.start_station();
     await page.locator('.top-bar .lamp.good').waitFor();

@@ -53,6 +53,9 @@ export const m_to_millimetres = (length_m: number) => length_m * 1e3;
 export const percent_to_duty = (value_percent: number) => Number((value_percent / 100).toPrecision(12));
 export const duty_to_percent = (duty: number) => duty * 100;
 
+// A way or a wait that was measured: "0.4 ms", "38 ms".
+export const milliseconds = (time_ms: number) => `${time_ms < 9.95 ? time_ms.toFixed(1) : Math.round(time_ms)} ms`;
+
 // How long ago, in one short word: "340 ms", "2.1 s", "5 min".
 export function age(age_ms: number): string {
   if (age_ms < 1000) return `${Math.max(0, Math.round(age_ms / 10) * 10)} ms`;

@@ -4,6 +4,7 @@
 
 import { batch, computed, signal } from '@preact/signals';
 import type { CommandRecord, EventRecord, LiveMessage, RobotState, RunRecord } from './api';
+import { Latches } from './latches';
 import { Robot } from './robot';
 import type { StopEvidence } from './stop_outcome';
 
@@ -33,6 +34,7 @@ export class Store {
   readonly is_current = signal(false);
   readonly runs = signal<RunRecord[]>([]); // that are open, at most one for each robot
   readonly interrupted = signal<RunRecord[]>([]); // of each robot its newest run, if the station stopped in it
+  readonly latches = new Latches();
   readonly now_ms = signal(0); // page time, for ages
   private readonly by_id = new Map<string, Robot>();
   private pending_log: LogLine[] = [];
@@ -48,7 +50,7 @@ export class Store {
       case 'welcome':
         batch(() => {
           this.actor.value = message.actor;
-          this.take_states(message.robots);
+          this.take_states(message.robots, false);
         });
         break;
       case 'robot':
@@ -58,13 +60,13 @@ export class Store {
         this.find(message.robot_id)?.receive(message, this.clocks.page_ms());
         break;
       case 'event':
-        this.write(this.line_of_event(message.event));
+        this.take_event(message.event);
         break;
       case 'command':
         this.write(line_of_command(message.command));
         break;
       case 'log':
-        message.events.forEach((event) => this.write(this.line_of_event(event)));
+        message.events.forEach((event) => this.take_event(event));
         message.commands.forEach((command) => this.write(line_of_command(command)));
         break;
       case 'run':
@@ -136,8 +138,10 @@ export class Store {
     return this.by_id.get(robot_id);
   }
 
-  private take_states(states: RobotState[]): void {
+  // saw_change: this page was there when what changed has changed.
+  private take_states(states: RobotState[], saw_change = true): void {
     const now_ms = this.clocks.page_ms();
+    for (const state of states) this.latches.note(state.emergency_id, this.clocks.utc_ms(), saw_change);
     const known_before = this.by_id.size;
     for (const state of states) {
       const known = this.by_id.get(state.robot_id);
@@ -194,6 +198,11 @@ export class Store {
     const best = robots.find((robot) => !robot.is_away.peek()) ?? this.selected.peek() ?? robots[0];
     this.selected_id.value = best?.robot_id ?? null;
     this.is_chosen.value = best !== undefined && !best.is_away.peek();
+  }
+
+  private take_event(event: EventRecord): void {
+    if (event.kind === 'emergency') this.latches.note(event.emergency_id, event.received_at_us / 1000, true);
+    this.write(this.line_of_event(event));
   }
 
   private line_of_event(event: EventRecord): LogLine {

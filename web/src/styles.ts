@@ -6,6 +6,7 @@ import 'uplot/dist/uPlot.min.css';
 import './style/ground.css';
 import './style/shell.css';
 import './style/top_bar.css';
+import './style/status.css';
 import './style/panels.css';
 import './style/readouts.css';
 import './style/charts.css';

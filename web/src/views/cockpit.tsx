@@ -29,13 +29,15 @@ export function Cockpit({ session }: { session: Session }) {
   return (
     <div class={`cockpit ${name === 'robot' ? 'of-robot' : 'of-view'}`}>
       <TopBar session={session} />
-      {View ? (
-        <View key={name} session={session} route={route.value} />
-      ) : view ? (
-        <NotLoaded session={session} view={view} />
-      ) : (
-        <NoSuchView />
-      )}
+      <div class="view">
+        {View ? (
+          <View key={name} session={session} route={route.value} />
+        ) : view ? (
+          <NotLoaded session={session} view={view} />
+        ) : (
+          <NoSuchView />
+        )}
+      </div>
       <div class="hands">
         <StopPanel session={session} />
         {Hands && (
@@ -44,6 +46,7 @@ export function Cockpit({ session }: { session: Session }) {
           </section>
         )}
       </div>
+      {session.cut_off.value && <div class="cut-off-frame" id="cut-off-frame" />}
     </div>
   );
 }
