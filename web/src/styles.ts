@@ -13,3 +13,4 @@ import './style/charts.css';
 import './style/controls.css';
 import './style/stop.css';
 import './style/small_screens.css';
+import './style/phone.css';
