@@ -109,6 +109,7 @@ export class Robot {
     return mode === 'emergency' || emergency_id !== null || (pending_stop !== null && !this.is_away.value);
   });
   readonly readout = signal<Readout>(kEmptyReadout);
+  readonly mode = computed(() => this.state.value.mode);
   readonly emergency_id = computed(() => this.state.value.emergency_id);
   // Connected, and its samples do not come.
   readonly is_silent = computed(() => !this.is_away.value && this.readout.value.watched && this.readout.value.stale);

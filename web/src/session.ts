@@ -26,6 +26,7 @@ import { browser_channel, kTell_ms, Tabs } from './tabs';
 import { Vitals } from './vitals';
 
 const kMaxWatchedAtOnce = 8; // in a larger fleet samples come of the robots that were looked at last
+const kMaxWatchedInFleet = 16; // and in the view of the fleet, of those that are in sight
 const kLook_ms = 5000; // how often the health of the recording is asked for
 const kKeepAlive_ms = 1000; // what this page controls stays its own for 3 s
 
@@ -52,6 +53,7 @@ export class Session {
   readonly vitals = new Vitals(this.path);
   readonly cut_off = signal<{ since_ms: number } | null>(null); // UTC; null while the page receives from the station
   readonly recording = signal<Recording | null>(null);
+  readonly in_sight = signal<string[]>([]); // rows of the view of the fleet
   readonly alarms = alarms_of(this);
   readonly alerts = new Alerts(this.settings, browser_alerts());
   readonly tabs = new Tabs(browser_channel(), () => performance.now());
@@ -266,8 +268,13 @@ export class Session {
     if (selected_id !== null) {
       this.looked_at = [selected_id, ...this.looked_at.filter((id) => id !== selected_id)].slice(0, kMaxWatchedAtOnce);
     }
+    const in_sight = this.in_sight.value.filter((id) => this.store.find(id)?.is_away.value === false);
     if (!is_fleet || !is_live) return;
-    if (this.link.send({ type: 'watch', robots: this.looked_at })) this.store.watch(this.looked_at);
+    const watched =
+      in_sight.length === 0
+        ? this.looked_at
+        : [...new Set([...this.looked_at.slice(0, 1), ...in_sight])].slice(0, kMaxWatchedInFleet);
+    if (this.link.send({ type: 'watch', robots: watched })) this.store.watch(watched);
   }
 
   // Keeps the connection, and with a fresh stamp what this page controls.

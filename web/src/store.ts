@@ -4,6 +4,7 @@
 
 import { batch, computed, signal } from '@preact/signals';
 import type { CommandRecord, EventRecord, LiveMessage, RobotState, RunRecord } from './api';
+import { natural_order } from './fleet';
 import { Latches } from './latches';
 import { Robot } from './robot';
 import type { StopEvidence } from './stop_outcome';
@@ -149,7 +150,7 @@ export class Store {
       else this.by_id.set(state.robot_id, new Robot(state, now_ms));
     }
     if (this.by_id.size > known_before) {
-      const ordered = [...this.by_id].sort(([a], [b]) => (a < b ? -1 : 1));
+      const ordered = [...this.by_id].sort(([a], [b]) => natural_order(a, b));
       this.robots.value = ordered.map(([, robot]) => robot);
     }
     this.select_by_itself();

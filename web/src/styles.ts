@@ -11,6 +11,7 @@ import './style/panels.css';
 import './style/readouts.css';
 import './style/charts.css';
 import './style/controls.css';
+import './style/fleet.css';
 import './style/stop.css';
 import './style/small_screens.css';
 import './style/phone.css';

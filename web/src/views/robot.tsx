@@ -10,6 +10,7 @@ import { Plots } from '../parts/plots';
 import { Readouts } from '../parts/readouts';
 import { RobotList } from '../parts/robot_list';
 import { RunControl } from '../parts/run_control';
+import { Waiting } from '../parts/waiting';
 import type { Session } from '../session';
 import type { ViewProps } from './table';
 
@@ -78,27 +79,6 @@ function UnknownRobot({ session, robot_id }: { session: Session; robot_id: strin
           Show {robot_id}
         </button>
       )}
-    </div>
-  );
-}
-
-function Waiting({ session }: { session: Session }) {
-  const address = session.station.value?.robots_address;
-  return (
-    <div class="waiting">
-      <h2>No robot yet</h2>
-      <p>
-        Robots connect to the station by themselves
-        {address && (
-          <>
-            , at <code>{address}</code>
-          </>
-        )}
-        . The first one that does is shown here.
-      </p>
-      <p>
-        A simulated one, on this machine: <code>rheonaut-sim --station {address ?? 'ADDRESS'} --id sim-1</code>
-      </p>
     </div>
   );
 }
