@@ -37,10 +37,15 @@ struct Functor {
   Index values() const { return squares.values; }
 };
 
+bool is_at(const KnownMinimum& known, const Eigen::VectorXd& x, double cost) {
+  return std::abs(cost - known.cost) <= KnownMinimum::kAgreement * known.cost &&
+         (x - known.x).cwiseAbs().maxCoeff() <= KnownMinimum::kNear;
+}
+
 }  // namespace
 
 Descended descend(const SquaresToMinimise& squares, Eigen::VectorXd x, int iteration_limit, Progress progress,
-                  SearchLimit& limit) {
+                  SearchLimit& limit, const KnownMinimum* known) {
   using Status = Eigen::LevenbergMarquardtSpace::Status;
   Functor functor{squares, limit};
   Eigen::LevenbergMarquardt<Functor> solver(functor);
@@ -67,7 +72,7 @@ Descended descend(const SquaresToMinimise& squares, Eigen::VectorXd x, int itera
     found.iterations = ++progress.iteration;
     progress.sse = squares.sse(solver.fvec);
     limit.report(progress);
-    if (limit.is_reached()) break;
+    if (limit.is_reached() || (known != nullptr && is_at(*known, x, solver.fvec.squaredNorm()))) break;
   }
   if (functor.is_not_finite) found.end = SearchEnd::not_finite;
   if (limit.end()) found.end = *limit.end();

@@ -28,7 +28,16 @@ struct Descended {
   double cost = 0;     // the sum of squares; infinite if it has not begun
 };
 
+// A minimum that an earlier descent has found. One that comes so near to it that it would end there ends at once.
+struct KnownMinimum {
+  static constexpr double kAgreement = 1e-6;  // of costs
+  static constexpr double kNear = 1e-3;       // of the coordinates, which are of order 1
+
+  Eigen::VectorXd x;
+  double cost = 0;
+};
+
 Descended descend(const SquaresToMinimise& squares, Eigen::VectorXd x, int iteration_limit, Progress progress,
-                  SearchLimit& limit);
+                  SearchLimit& limit, const KnownMinimum* known = nullptr);
 
 }  // namespace control

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 #include "control/search/descent.hpp"
 
@@ -13,7 +14,6 @@ namespace {
 using Eigen::Index;
 
 constexpr double kRoundingShare = 1e-9;  // residuals below this share of the signal are equal
-constexpr double kAgreement = 1e-6;      // of costs
 constexpr int kWeightRounds = 3;
 constexpr int kReweightings = 200;  // of the absolute error
 constexpr int kIterationsPerReweighting = 3;
@@ -198,7 +198,8 @@ double JointSearch::sse_of(const Eigen::VectorXd& residual) const {
   return sum;
 }
 
-SearchEnd JointSearch::descend(Structure structure, Points& points, int iteration_limit, Progress progress) {
+SearchEnd JointSearch::descend(Structure structure, Points& points, int iteration_limit, Progress progress,
+                               const KnownMinimum* known) {
   SquaresToMinimise squares;
   for (const auto& of_run : weights_) {
     for (const Weight& weight : of_run) squares.values += weight.root_weight.size();
@@ -208,7 +209,8 @@ SearchEnd JointSearch::descend(Structure structure, Points& points, int iteratio
   };
   squares.slopes = [&](const Eigen::VectorXd& x, Eigen::MatrixXd& slopes) { return slopes_at(structure, x, slopes); };
   squares.sse = [&](const Eigen::VectorXd& residual) { return sse_of(residual); };
-  const Descended found = control::descend(squares, coordinates(structure, points), iteration_limit, progress, limit_);
+  const Descended found =
+      control::descend(squares, coordinates(structure, points), iteration_limit, progress, limit_, known);
   last_iterations_ = found.iterations;
   last_cost_ = found.cost;
   if (found.has_begun && found.x.allFinite()) points = points_at(structure, found.x);
@@ -236,26 +238,29 @@ void JointSearch::run_starts(Structure structure, JointResult& result) {
   for (const auto& of_run : weights_) values += static_cast<double>(of_run.front().root_weight.size());
   const double rounding = kRoundingShare * kRoundingShare * values;
   double best = std::numeric_limits<double>::infinity();
+  std::optional<KnownMinimum> minimum;
   for (int index = 0; index < starts; ++index) {
     const Progress progress{structure, index, starts, 0, 0};
     limit_.begin(progress);
     if (limit_.is_reached()) break;
     Points points = start(structure, index);
     if (limit_.is_reached()) break;
-    const SearchEnd end = descend(structure, points, options_.iteration_limit, progress);
+    const SearchEnd end = descend(structure, points, options_.iteration_limit, progress, minimum ? &*minimum : nullptr);
     if (limit_.end() && last_iterations_ == 0) break;
     if (costs.empty() || last_cost_ < best) {
       best = std::min(best, last_cost_);
       result.points = points;
       result.end = end;
       result.iterations = last_iterations_;
+      minimum.reset();
+      if (end == SearchEnd::converged) minimum = {coordinates(structure, points), last_cost_};
     }
     costs.push_back(last_cost_);
     if (limit_.end()) break;
   }
   result.starts = static_cast<int>(costs.size());
-  result.starts_that_agree = static_cast<int>(
-      std::ranges::count_if(costs, [&](double found) { return found <= best * (1 + kAgreement) + rounding; }));
+  result.starts_that_agree = static_cast<int>(std::ranges::count_if(
+      costs, [&](double found) { return found <= best * (1 + KnownMinimum::kAgreement) + rounding; }));
 }
 
 void JointSearch::refine_weights(Structure structure, JointResult& result) {

@@ -64,7 +64,8 @@ class JointSearch {
   void run_starts(Structure structure, JointResult& result);
   void refine_weights(Structure structure, JointResult& result);
   void refine_absolute_error(Structure structure, JointResult& result);
-  SearchEnd descend(Structure structure, Points& points, int iteration_limit, Progress progress);
+  SearchEnd descend(Structure structure, Points& points, int iteration_limit, Progress progress,
+                    const KnownMinimum* known = nullptr);
   double absolute_cost(const Points& points);  // (2)
   Eigen::VectorXd coordinates(Structure structure, const Points& points) const;
   Points points_at(Structure structure, const Eigen::VectorXd& x) const;

@@ -4,9 +4,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <utility>
-
-#include "control/search/descent.hpp"
 
 namespace control {
 namespace {
@@ -16,7 +15,6 @@ using Eigen::Index;
 constexpr double kNearestToBound = 1e-9;  // of the orders and the dead time, as a share of their interval
 constexpr double kLargestLog = 60;        // of the gain and the coefficients, against their start in the search
 constexpr double kRoundingShare = 1e-9;   // residuals below this share of the signal are equal
-constexpr double kAgreement = 1e-6;       // of costs
 constexpr int kWeightRounds = 3;          // of two channels
 constexpr int kReweightings = 200;        // of the absolute error
 constexpr int kIterationsPerReweighting = 3;
@@ -240,7 +238,8 @@ bool OutputErrorSearch::weighed_slopes(Structure structure, const SearchPoint& p
   return true;
 }
 
-SearchEnd OutputErrorSearch::descend(Structure structure, SearchPoint& point, int iteration_limit, Progress progress) {
+SearchEnd OutputErrorSearch::descend(Structure structure, SearchPoint& point, int iteration_limit, Progress progress,
+                                     const KnownMinimum* known) {
   SquaresToMinimise squares;
   squares.values = rows_ * static_cast<Index>(measured_.size());
   squares.residuals = [&](const Eigen::VectorXd& x, Eigen::VectorXd& residual) {
@@ -257,7 +256,8 @@ SearchEnd OutputErrorSearch::descend(Structure structure, SearchPoint& point, in
     }
     return sum;
   };
-  const Descended found = control::descend(squares, coordinates(structure, point), iteration_limit, progress, limit_);
+  const Descended found =
+      control::descend(squares, coordinates(structure, point), iteration_limit, progress, limit_, known);
   last_iterations_ = found.iterations;
   last_cost_ = found.cost;
   if (found.has_begun && found.x.allFinite()) point = point_at(structure, found.x);
@@ -289,6 +289,7 @@ void OutputErrorSearch::run_starts(Structure structure, SearchResult& result) {
   const int starts = 1 + options_.further_starts;
   const double rounding = kRoundingShare * kRoundingShare * static_cast<double>(rows_);
   double best = std::numeric_limits<double>::infinity();
+  std::optional<KnownMinimum> minimum;
   for (int index = 0; index < starts; ++index) {
     const Progress progress{structure, index, starts, 0, 0};
     limit_.begin(progress);
@@ -297,20 +298,23 @@ void OutputErrorSearch::run_starts(Structure structure, SearchResult& result) {
     fit_gain(point);
     if (options_.longest_dead_time_s > 0 && !sensor()) fit_dead_time(point);
     if (limit_.is_reached()) break;
-    const SearchEnd end = descend(structure, point, options_.iteration_limit, progress);
+    const SearchEnd end = descend(structure, point, options_.iteration_limit, progress, minimum ? &*minimum : nullptr);
     if (limit_.end() && last_iterations_ == 0) break;
     if (costs.empty() || last_cost_ < best) {
       best = std::min(best, last_cost_);
       result.point = point;
       result.end = end;
       result.iterations = last_iterations_;
+      minimum.reset();
+      if (end == SearchEnd::converged) minimum = {coordinates(structure, point), last_cost_};
     }
     costs.push_back(last_cost_);
     if (limit_.end()) break;
   }
   result.starts = static_cast<int>(costs.size());
-  result.starts_that_agree = static_cast<int>(std::count_if(
-      costs.begin(), costs.end(), [&](double found) { return found <= best * (1 + kAgreement) + rounding; }));
+  result.starts_that_agree = static_cast<int>(std::count_if(costs.begin(), costs.end(), [&](double found) {
+    return found <= best * (1 + KnownMinimum::kAgreement) + rounding;
+  }));
 }
 
 void OutputErrorSearch::refine_channel_weights(Structure structure, SearchResult& result) {

@@ -17,6 +17,7 @@
 #include <memory>
 #include <vector>
 
+#include "control/search/descent.hpp"
 #include "control/search/fit.hpp"
 #include "control/search/output_model.hpp"
 #include "control/search/search_limit.hpp"
@@ -112,7 +113,8 @@ class OutputErrorSearch {
   double sensor_sd(const SearchPoint& point);  // of a reading
   void run_starts(Structure structure, SearchResult& result);
   void make_scan(const Recording& recording);
-  SearchEnd descend(Structure structure, SearchPoint& point, int iteration_limit, Progress progress);
+  SearchEnd descend(Structure structure, SearchPoint& point, int iteration_limit, Progress progress,
+                    const KnownMinimum* known = nullptr);
   // What it minimises; false: the limit is reached.
   bool weighed_residuals(const SearchPoint& point, Eigen::VectorXd& residual);
   bool weighed_slopes(Structure structure, const SearchPoint& point, Eigen::MatrixXd& slopes);  // by (3)

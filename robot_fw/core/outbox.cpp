@@ -28,6 +28,7 @@ void Outbox::welcomed(const TelemetryRing& samples, const EventRing& events) {
   live_ = {samples.next_seq(), samples.next_seq()};
   event_next_ = events.oldest_seq();
   heartbeat_ = rheonaut_Heartbeat_init_zero;
+  stop_probe_us_ = 0;
   status_due_us_ = 0;
   page_count_ = 0;  // those of commands of an earlier connection
   controller_due_ = true;
@@ -106,6 +107,7 @@ Outgoing Outbox::next(const Link& link, const TelemetryRing& samples, const Even
   if (hello_due_) return Outgoing::hello;
   if (stop_acks_ > 0) return Outgoing::ack;
   if (!link.up()) return Outgoing::none;
+  if (stop_probe_us_ != 0) return Outgoing::stop_probe_answer;
   catch_up(samples, events);
   if (ack_count_ > 0) return Outgoing::ack;
   if (page_count_ > 0) return Outgoing::parameters;
@@ -130,6 +132,7 @@ void Outbox::sent(Outgoing what, std::size_t samples_in_frame, std::uint64_t now
       first_ack_ = (first_ack_ + 1) % kMaxAcks;
       --ack_count_;
       break;
+    case Outgoing::stop_probe_answer: stop_probe_us_ = 0; break;
     case Outgoing::parameters:
       std::copy(pages_.begin() + 1, pages_.end(), pages_.begin());
       --page_count_;

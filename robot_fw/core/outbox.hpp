@@ -1,6 +1,6 @@
 // Decides what is sent next: the order of the messages, and how far each sequence has been sent.
 //
-// First to last: hello, acks of stops, acks, requested parameters and controller, events, live samples, status,
+// First to last: hello, acks of stops, answer to a stop probe, acks, requested parameters and controller, events, live samples, status,
 // heartbeat, what is in force (after a Welcome), backfill. Backfill: samples from before this connection
 // that the station lacks, or that it requests again; at most twice the rate of the live samples.
 #pragma once
@@ -16,7 +16,20 @@
 
 namespace robot_fw {
 
-enum class Outgoing { none, hello, ack, parameters, controller, event, live, status, heartbeat, table, backfill };
+enum class Outgoing {
+  none,
+  hello,
+  ack,
+  stop_probe_answer,
+  parameters,
+  controller,
+  event,
+  live,
+  status,
+  heartbeat,
+  table,
+  backfill
+};
 
 // A run of samples still to be sent: [next_seq, end_seq).
 struct SampleRun {
@@ -58,6 +71,8 @@ class Outbox {
   bool has_room_for_pages(std::size_t pages) const { return page_count_ + pages <= kMaxPages; }
   void controller_changed() { controller_due_ = true; }
   void echo(std::uint64_t station_time_us, std::uint64_t received_at_us);
+  // SAFETY: behind the acks of stops and ahead of all else, so that it takes as long as the ack of a stop would.
+  void answer_stop_probe(std::uint64_t station_time_us) { stop_probe_us_ = station_time_us; }
   // Once per tick, after the sample was made; `urgent` sends it, and all before it, at once.
   void sample_made(const TelemetryRing& samples, bool urgent);
 
@@ -74,6 +89,7 @@ class Outbox {
   std::uint64_t live_seq() const { return live_.next_seq; }
   const SampleRun& backfill() const { return backfill_; }
   const protocol::Heartbeat& heartbeat() const { return heartbeat_; }
+  std::uint64_t stop_probe_us() const { return stop_probe_us_; }
 
  private:
   void catch_up(const TelemetryRing& samples, const EventRing& events);
@@ -105,6 +121,7 @@ class Outbox {
   SampleRun backfill_;
   std::size_t backfill_credit_ = 0;  // samples that may be sent now
   protocol::Heartbeat heartbeat_{};  // the answer to a clock probe, zero when none is due
+  std::uint64_t stop_probe_us_ = 0;  // to be echoed; 0: none
   std::uint64_t status_due_us_ = 0;
 };
 

@@ -56,6 +56,9 @@ bool Robot::on_frame() {
   if (is_welcome == is_up) return false;
   if (is_welcome) return on_welcome(frame->body.welcome);
   if (frame->which_body == rheonaut_StationFrame_heartbeat_tag) channel_.on_heartbeat(frame->body.heartbeat, now_us_);
+  if (frame->which_body == rheonaut_StationFrame_stop_probe_tag) {
+    channel_.outbox().answer_stop_probe(frame->body.stop_probe.station_time_us);
+  }
   if (is_command) on_command(frame->body.command);
   return true;
 }
@@ -145,6 +148,7 @@ void Robot::fill_hello(protocol::Hello& hello) const {
   hello.mode = mode();
   hello.emergency_id = safety_.emergency_id();
   hello.emergency_cause = safety_.cause();
+  hello.answers_stop_probes = true;
 }
 
 void Robot::fill_status(protocol::Status& status) const {

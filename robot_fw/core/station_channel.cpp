@@ -50,6 +50,9 @@ void StationChannel::fill(Outgoing what, protocol::RobotFrame& frame) const {
   if (what == Outgoing::ack) {
     frame.which_body = rheonaut_RobotFrame_command_ack_tag;
     frame.body.command_ack = outbox_.first_ack();
+  } else if (what == Outgoing::stop_probe_answer) {
+    frame.which_body = rheonaut_RobotFrame_stop_probe_answer_tag;
+    frame.body.stop_probe_answer.echo_station_time_us = outbox_.stop_probe_us();
   } else if (what == Outgoing::event) {
     frame.which_body = rheonaut_RobotFrame_event_tag;
     frame.body.event = events_.at(outbox_.event_seq());

@@ -99,6 +99,15 @@ Result<void> on_renew_lease(const Members& message, const identity::Caller& call
   return {};
 }
 
+// What the page has sent with its latest stamp comes back at once, so that it measures the way there and back.
+Result<void> on_echo(const Members& message, live::Subscriber& page) {
+  if (auto known = message.only({"type", "stamp_us"}); !known) return known;
+  const auto stamp_us = message.integer("stamp_us", {0, INT64_MAX});
+  if (!stamp_us) return std::unexpected{stamp_us.error()};
+  page.push(std::make_shared<const std::string>(base::dump({{"type", "echo"}, {"stamp_us", *stamp_us}})), true);
+  return {};
+}
+
 // A robot that is not known may come yet.
 Result<void> on_watch(const Members& message, live::Subscriber& page, LiveParts& parts) {
   if (auto known = message.only({"type", "robots"}); !known) return known;
@@ -139,6 +148,7 @@ Result<void> on_page_message(const std::string& text, const identity::Caller& ca
   if (*type == "emergency_stop") return on_emergency_stop(*message, caller, parts);
   if (*type == "renew_lease") return on_renew_lease(*message, caller, parts);
   if (*type == "keep_alive") return on_keep_alive(*message, caller, parts);
+  if (*type == "echo") return on_echo(*message, page);
   if (*type == "watch") return on_watch(*message, page, parts);
   return fail(ErrorCode::invalid, fmt::format("unknown message type '{}'", *type), "unknown_type");
 }

@@ -81,7 +81,7 @@ class LivePage {
     const auto message = Members::parse(text, {});
     const auto type = message ? message->text("type", {0, kMaxMessageBytes}) : std::unexpected{message.error()};
     if (!type) return {};  // refused for that
-    const bool is_reading = *type == "keep_alive" || *type == "watch";
+    const bool is_reading = *type == "keep_alive" || *type == "watch" || *type == "echo";
     const identity::Scope needed = *type == "emergency_stop" ? identity::Scope::stop
                                    : is_reading              ? identity::Scope::read
                                                              : identity::Scope::command;

@@ -87,8 +87,14 @@ std::optional<protocol::StationFrame> RobotOutbox::next_frame(std::int64_t now_u
     return frame;
   }
   frame.which_body = rheonaut_StationFrame_command_tag;
-  // SAFETY: an emergency stop goes ahead of everything that waits.
-  if (take_stop(frame.body.command) || take_command(now_us, frame.body.command)) return frame;
+  // SAFETY: an emergency stop goes ahead of everything that waits, and a probe where a stop would if there were one.
+  if (take_stop(frame.body.command)) return frame;
+  if (stop_probes_.is_due(now_us)) {
+    frame.which_body = rheonaut_StationFrame_stop_probe_tag;
+    frame.body.stop_probe.station_time_us = stop_probes_.take(now_us);
+    return frame;
+  }
+  if (take_command(now_us, frame.body.command)) return frame;
   if (!heartbeat_wanted_ && now_us < next_heartbeat_us_) return std::nullopt;
   frame.which_body = rheonaut_StationFrame_heartbeat_tag;
   frame.body.heartbeat = take_heartbeat(now_us);

@@ -1,6 +1,6 @@
 // The frames to be sent to one robot: their order, and the unsent rest of a frame.
 //
-// First to last: Welcome, emergency stops, commands, a heartbeat when it is due or requested. Commands wait in a
+// First to last: Welcome, emergency stops, a stop probe, commands, a heartbeat when it is due or requested. Commands wait in a
 // bounded queue until the robot has a place for their answer (command_window.hpp), or until their validity has passed.
 // Times are steady µs. Pure, on the thread of its owner: no socket, no clock, no station.
 #pragma once
@@ -12,6 +12,7 @@
 
 #include "protocol/frame.hpp"
 #include "server/link/command_window.hpp"
+#include "server/link/stop_probes.hpp"
 #include "server/station/state/station_state.hpp"
 
 namespace server::link {
@@ -24,7 +25,8 @@ class RobotOutbox {
   // Says how many of the bytes the stream took without waiting.
   using Writer = std::function<std::size_t(protocol::Bytes)>;
 
-  explicit RobotOutbox(std::int64_t heartbeat_interval_us) : heartbeat_interval_us_{heartbeat_interval_us} {}
+  explicit RobotOutbox(std::int64_t heartbeat_interval_us)
+      : heartbeat_interval_us_{heartbeat_interval_us}, stop_probes_{heartbeat_interval_us} {}
 
   // The first frame that is written; nothing else is asked for before.
   void welcome(const protocol::Welcome& welcome);
@@ -46,13 +48,18 @@ class RobotOutbox {
   }
   void on_ack(const protocol::CommandAck& ack);
   void on_event_of(station::CommandId id) { window_.ended(id); }
+  // When they begin, their answers, what they say of the way of a stop.
+  StopProbes& stop_probes() { return stop_probes_; }
+  const StopProbes& stop_probes() const { return stop_probes_; }
   // False when the probe of the robot's clock that waits for its answer had another stamp.
   bool on_probe_answer(std::uint64_t echo_station_time_us);
 
   // Something may be due after on_received().
   bool has_work() const { return heartbeat_wanted_ || !commands_.empty(); }
   // An answer to a stop, a command or a probe is still to come.
-  bool awaits_answer() const { return awaited_stop_ != 0 || awaited_command_ != 0 || probe_us_ != 0; }
+  bool awaits_answer() const {
+    return awaited_stop_ != 0 || awaited_command_ != 0 || probe_us_ != 0 || stop_probes_.awaits_answer();
+  }
   std::int64_t next_heartbeat_us() const { return next_heartbeat_us_; }
 
   struct Written {
@@ -81,6 +88,7 @@ class RobotOutbox {
   std::optional<protocol::Welcome> welcome_;
   std::deque<protocol::Command> stops_;                        // SAFETY: always written first
   station::CommandId awaited_stop_ = 0, awaited_command_ = 0;  // the last that was written and is not answered; 0: none
+  StopProbes stop_probes_;
   std::deque<QueuedCommand> commands_;
   CommandWindow window_;                                                        // SAFETY: of all but stops
   protocol::StationHeartbeat heartbeat_ = rheonaut_StationHeartbeat_init_zero;  // the next one, but for the probe

@@ -106,6 +106,7 @@ void RobotSession::on_bytes(protocol::Bytes unread) {
   }
   if (!close_reason_.empty()) return reading_paused_.notify();
   outbox_.on_received(last_received_us_);
+  if (!stop_path_.is_open) report_stop_path();
   if (outbox_.has_work() && !robot_id_.empty()) flush();
 }
 
@@ -156,6 +157,7 @@ asio::awaitable<bool> RobotSession::admit(const protocol::Hello& hello) {
   reach_ = station::FrameReach::after(hello, hello_robot_time_us_);
   outbox_.welcome(welcome_of(admission, station_.link_times(), clock_.utc_us()));
   last_received_us_ = clock_.steady_us();
+  if (hello.answers_stop_probes) outbox_.stop_probes().begin(last_received_us_);
   station_.on_connected(*this, request, hello, admission, stream_->peer());
   co_return true;
 }
@@ -212,6 +214,7 @@ void RobotSession::on_frame(protocol::RobotFrame& frame) {
       station_.on_command_ack(*this, frame.body.command_ack);
       update_read_priority();
       break;
+    case rheonaut_RobotFrame_stop_probe_answer_tag: on_stop_probe_answer(frame.body.stop_probe_answer); break;
     case rheonaut_RobotFrame_heartbeat_tag: on_heartbeat(frame); break;
     default: break;  // a message of a newer version
   }
@@ -233,6 +236,19 @@ void RobotSession::on_heartbeat(const protocol::RobotFrame& frame) {
   exchange.answered_at_robot_us = static_cast<std::int64_t>(frame.robot_time_us);
   exchange.answer_received_at_us = last_received_us_;
   station_.on_clock(*this, exchange);
+}
+
+void RobotSession::on_stop_probe_answer(const protocol::StopProbeAnswer& answer) {
+  if (!outbox_.stop_probes().on_answer(answer.echo_station_time_us, last_received_us_, clock_.utc_us())) return;
+  update_read_priority();
+  report_stop_path();
+}
+
+void RobotSession::report_stop_path() {
+  const station::StopPath& path = outbox_.stop_probes().judge(last_received_us_, clock_.steady_us());
+  if (path == stop_path_) return;
+  stop_path_ = path;
+  station_.on_stop_path(*this, path);
 }
 
 // Carries on where flush() cannot: with a stream that takes no more for now.
@@ -278,11 +294,15 @@ asio::awaitable<RobotSession::EndReason> RobotSession::watch_link() {
     const std::int64_t now_us = clock_.steady_us();
     if (now_us - last_received_us_ >= timeout_us) co_return "no frame within the link time-out";
     if (writing_since_us_ && now_us - *writing_since_us_ >= timeout_us) co_return "the robot does not read";
-    if (now_us >= outbox_.next_heartbeat_us()) flush();
+    const StopProbes& probes = outbox_.stop_probes();
+    if (now_us >= outbox_.next_heartbeat_us() || probes.is_due(now_us)) flush();
+    report_stop_path();
     const std::int64_t silent_since_us = std::min(last_received_us_, writing_since_us_.value_or(last_received_us_));
     const std::int64_t lost_us = silent_since_us + timeout_us;
     const bool can_write = outbox_.unsent().empty();
-    const std::int64_t due_us = can_write ? std::min(lost_us, outbox_.next_heartbeat_us()) : lost_us;
+    std::int64_t due_us = can_write ? std::min(lost_us, outbox_.next_heartbeat_us()) : lost_us;
+    if (can_write && stop_path_.is_measured) due_us = std::min(due_us, probes.due_us());
+    if (stop_path_.is_open) due_us = std::min(due_us, probes.ends_us(last_received_us_));
     co_await clock_.sleep_until((due_us + kGridUs - 1) / kGridUs * kGridUs);
   }
 }

@@ -70,6 +70,8 @@ class RobotSession final : public station::RobotLink {
   void on_frame(protocol::RobotFrame& frame);
   void report_unusable(const protocol::RobotFrame& frame);
   void on_heartbeat(const protocol::RobotFrame& frame);
+  void on_stop_probe_answer(const protocol::StopProbeAnswer& answer);
+  void report_stop_path();
   void flush();
   void update_read_priority();
 
@@ -91,6 +93,8 @@ class RobotSession final : public station::RobotLink {
   runtime::Signal reading_paused_;  // the hello has come, or a reason to close
   runtime::Signal wake_writer_;     // something is ready that flush() could not write
   RobotOutbox outbox_;
+
+  station::StopPath stop_path_;  // as the station was told
 
   std::int64_t last_received_us_ = 0;
   std::optional<std::int64_t> writing_since_us_;  // while there is something unsent

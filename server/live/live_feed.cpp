@@ -129,7 +129,8 @@ LiveFeed::Headline LiveFeed::headline(const station::RobotState& robot) {
           robot.context.mode,
           robot.context.sub_state,
           robot.context.emergency_id,
-          robot.pending_stop.value_or(0)};
+          robot.pending_stop.value_or(0),
+          robot.stop_path.is_open};
 }
 
 std::size_t LiveFeed::publish_robot(const Robot& robot, const Change& change) {

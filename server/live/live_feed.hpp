@@ -51,7 +51,7 @@ class LiveFeed final : public station::StationSink {
   using Subscribers = std::vector<Subscriber*>;
   // Of a robot's state what is published to all, and at once to those who watch it.
   using Headline = std::tuple<station::LinkState, station::BootId, protocol::Mode, protocol::SubState, std::uint64_t,
-                              station::CommandId>;
+                              station::CommandId, bool>;
 
   // What is still to be published of a robot's state, and to whom.
   struct Change {

@@ -105,6 +105,13 @@ json to_json(const station::RobotModel& model) {
           {"set_at_us", time_or_null(model.set_at_us)}};
 }
 
+json to_json(const station::StopPath& path) {
+  const bool is_answered = path.answered_at_us != 0;
+  return {{"is_open", path.is_open},
+          {"round_trip_us", is_answered ? json(path.round_trip_us) : json(nullptr)},
+          {"answered_at_us", time_or_null(path.answered_at_us)}};
+}
+
 json to_json(const station::RobotState& robot) {
   const station::SampleContext& context = robot.context;
   json out;
@@ -128,6 +135,7 @@ json to_json(const station::RobotState& robot) {
   out["latest_robot_time_us"] = robot.latest_robot_time_us;
   out["status"] = robot.status ? status_json(*robot.status) : json(nullptr);
   out["clock"] = robot.clock.valid ? clock_json(robot) : json(nullptr);
+  out["stop_path"] = robot.stop_path.is_measured ? to_json(robot.stop_path) : json(nullptr);
   out["pending_stop"] = id_text(robot.pending_stop.value_or(0));
   out["retired"] = robot.retired_at_us != 0;
   out["fluid"] = robot.fluid.empty() ? json(nullptr) : json(robot.fluid);

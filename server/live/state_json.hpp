@@ -15,6 +15,7 @@ using base::decimal;
 using base::dump;
 
 nlohmann::json to_json(const station::RobotModel& model);
+nlohmann::json to_json(const station::StopPath& path);
 nlohmann::json to_json(const station::RobotState& robot);
 nlohmann::json to_json(const station::Sample& sample);
 nlohmann::json to_json(const station::CommandRecord& record);

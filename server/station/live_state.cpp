@@ -64,6 +64,7 @@ void begin_connection(RobotEntry& entry, const AdmissionRequest& hello, const pr
   robot.connected_at_us = robot.last_received_at_us = hello.received_at_us;
   robot.last_received_steady_us = now_steady_us;
   robot.latest_robot_time_us = hello.robot_time_us;
+  robot.stop_path = {.is_measured = details.answers_stop_probes};
   if (is_other_boot) begin_boot(entry);
   show_hello(robot, hello, details, admission, is_other_boot);
 }

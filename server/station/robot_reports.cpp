@@ -61,6 +61,7 @@ void Station::on_disconnected(RobotLink& link, const std::string& reason) {
   RobotTable::disconnect(*entry);
   RobotState& robot = entry->robot;
   robot.link = LinkState::disconnected;
+  robot.stop_path = {.is_measured = robot.stop_path.is_measured};
   spdlog::info("robot '{}' disconnected: {}", robot.id, reason);
   parts_->tracker.end_with_link(*entry, "link_lost");
   parts_->notifier.note(robot, "disconnected", reason);
@@ -190,6 +191,16 @@ void Station::on_clock(RobotLink& link, const ClockExchange& exchange) {
     parts_->notifier.note(robot, "station_clock_set", fmt::format("by {} ms", report.station_step_us / 1000));
   }
   if (report.record) parts_->notifier.publish(robot, *report.record);
+}
+
+// Its latency is published with the state that follows each Status.
+void Station::on_stop_path(RobotLink& link, const StopPath& path) {
+  RobotEntry* entry = RobotTable::of(link);
+  if (entry == nullptr) return;
+  RobotState& robot = entry->robot;
+  const bool has_changed = path.is_open != robot.stop_path.is_open;
+  robot.stop_path = path;
+  if (has_changed) parts_->notifier.publish(robot);
 }
 
 void Station::on_parameters(RobotLink& link, const protocol::ParameterPage& page) {

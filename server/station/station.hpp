@@ -129,6 +129,7 @@ class Station {
   void on_command_ack(RobotLink& link, const protocol::CommandAck& ack);
   void on_command_sent(RobotLink& link, CommandId id);
   void on_clock(RobotLink& link, const ClockExchange& exchange);
+  void on_stop_path(RobotLink& link, const StopPath& path);
   void on_parameters(RobotLink& link, const protocol::ParameterPage& page);
   void on_controller(RobotLink& link, const protocol::Controller& controller);
 

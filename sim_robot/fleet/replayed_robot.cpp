@@ -98,6 +98,8 @@ bool ReplayedRobot::on_frame(const protocol::StationFrame& frame) {
   if (frame.which_body == rheonaut_StationFrame_command_tag) {
     ++counts_.commands;
     if (commands_.size() < kMaxCommands) commands_.push_back(frame.body.command.command_id);
+  } else if (frame.which_body == rheonaut_StationFrame_stop_probe_tag) {
+    stop_probe_us_ = frame.body.stop_probe.station_time_us;
   } else {
     const protocol::StationHeartbeat& heartbeat = frame.body.heartbeat;
     acknowledge(heartbeat.durable_next_seq);
@@ -144,12 +146,12 @@ void ReplayedRobot::resend(std::uint64_t first_seq, std::uint64_t end_seq) {
   backfill_ = {is_idle ? from : std::min(from, backfill_.next), is_idle ? to : std::max(to, backfill_.end)};
 }
 
-// In the order of the robot's outbox: hello, acks, live, status, heartbeat, backfill.
+// In the order of the robot's outbox: hello, answer to a stop probe, acks, live, status, heartbeat, backfill.
 std::size_t ReplayedRobot::next_frame(std::uint8_t* out, std::size_t capacity) {
   live_.next = std::max(live_.next, oldest_);
   backfill_.next = std::max(backfill_.next, oldest_);
   const bool is_greeted = phase_ == Phase::up && !hello_is_due_;
-  if (is_greeted && commands_.empty() && live_.next < live_.end) return write_telemetry(live_, false, out, capacity);
+  if (is_greeted && stop_probe_us_ == 0 && commands_.empty() && live_.next < live_.end) return write_telemetry(live_, false, out, capacity);
   protocol::RobotFrame frame = rheonaut_RobotFrame_init_zero;
   frame.robot_time_us = robot_time_us();
   if (fill_small_frame(frame)) {
@@ -182,6 +184,11 @@ bool ReplayedRobot::fill_small_frame(protocol::RobotFrame& frame) {
     return true;
   }
   if (phase_ != Phase::up) return false;
+  if (stop_probe_us_ != 0) {
+    frame.which_body = rheonaut_RobotFrame_stop_probe_answer_tag;
+    frame.body.stop_probe_answer.echo_station_time_us = std::exchange(stop_probe_us_, 0);
+    return true;
+  }
   if (!commands_.empty()) {
     frame.which_body = rheonaut_RobotFrame_command_ack_tag;
     frame.body.command_ack.command_id = commands_.front();
@@ -216,6 +223,7 @@ void ReplayedRobot::fill_hello(protocol::Hello& hello) const {
   hello.oldest_seq = oldest_seq();
   hello.next_seq = recording_.first_seq(next_);
   hello.mode = rheonaut_MODE_MANUAL;
+  hello.answers_stop_probes = true;
 }
 
 SampleCounts ReplayedRobot::samples() const {

@@ -83,6 +83,7 @@ class ReplayedRobot final : public FleetMember, private Speaker {
   bool hello_is_due_ = false;
   std::deque<std::uint64_t> commands_;  // to be answered
   protocol::Heartbeat echo_ = rheonaut_Heartbeat_init_zero;
+  std::uint64_t stop_probe_us_ = 0;  // to be answered; 0: none
   std::uint64_t received_at_us_ = 0, sent_at_us_ = 0, status_due_us_ = 0;
   std::uint64_t silence_us_ = 0, heartbeat_us_ = 0;
   SampleCounts counts_;

@@ -18,7 +18,7 @@ BUDGETS = (
     ("core_bytes", "core state without ring and frame buffer", 4_352, "bytes"),
     ("ring_bytes", "ring", 22 * 1024, "bytes"),
     ("stack_bytes", "stack, deepest", 2_048, "bytes"),
-    ("text_bytes", "text: core, protocol, nanopb", 42 * 1024, "bytes"),
+    ("text_bytes", "text: core, protocol, nanopb", 43 * 1024, "bytes"),
 )
 # Told beside them, without a limit of their own.
 REPORTED = (

@@ -21,6 +21,9 @@ void build_hello(Built& built) {
   hello.controller_checksum = paper_controller().checksum;
   hello.mode = rheonaut_MODE_MANUAL;
   built["hello"] = framed(frame);
+  hello.answers_stop_probes = true;
+  built["hello_answers_stop_probes"] = framed(frame);
+  hello.answers_stop_probes = false;
 
   frame.robot_time_us = kMax64;
   set_text(hello.robot_id, "abcdefghijklmnopqrstuvwxyz_0123");
@@ -53,6 +56,19 @@ void build_heartbeats(Built& built) {
   built["station_heartbeat_resend"] = framed(station);
   heartbeat = {kMax64, kMax64, kMax64, kMax64, kMax64, true};
   built["station_heartbeat_limits"] = framed(station);
+}
+
+void build_stop_probes(Built& built) {
+  auto station = from_station(rheonaut_StationFrame_stop_probe_tag);
+  station.body.stop_probe.station_time_us = 86'400'000'000;
+  built["stop_probe"] = framed(station);
+  station.body.stop_probe.station_time_us = kMax64;
+  built["stop_probe_limits"] = framed(station);
+  auto robot = from_robot(rheonaut_RobotFrame_stop_probe_answer_tag);
+  robot.body.stop_probe_answer.echo_station_time_us = 86'400'000'000;
+  built["stop_probe_answer"] = framed(robot);
+  robot.robot_time_us = robot.body.stop_probe_answer.echo_station_time_us = kMax64;
+  built["stop_probe_answer_limits"] = framed(robot);
 }
 
 void build_small_batches(Built& built) {
@@ -227,6 +243,7 @@ void build_parameters_and_controller(Built& built) {
 void build_robot_frames(Built& built) {
   build_hello(built);
   build_heartbeats(built);
+  build_stop_probes(built);
   build_small_batches(built);
   build_auto_batches(built);
   build_events(built);

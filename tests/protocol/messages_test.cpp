@@ -145,7 +145,7 @@ TEST(Messages, SurviveARoundTripWhateverTheirValues) {
     ASSERT_TRUE(station_again.has_value()) << "body " << station.which_body;
     ASSERT_EQ(encoded(*station_again), station_bytes) << "body " << station.which_body;
   }
-  EXPECT_EQ(bodies.size(), 8u);
+  EXPECT_EQ(bodies.size(), 9u);
   EXPECT_EQ(actions.size(), 15u);
 }
 

@@ -254,5 +254,45 @@ TEST_F(RobotLink, SaysWhenTheConnectionIsSilent) {
   EXPECT_FALSE(core().connection_is_silent(robot.robot_time_us()));
 }
 
+// SAFETY: nobody ordered anything: what runs goes on, what lapses lapses, and the robot's memory of ids stays.
+TEST_F(RobotLink, AStopProbeIsAnsweredInEachModeAndDoesNothing) {
+  protocol::StationFrame probe = rheonaut_StationFrame_init_zero;
+  probe.which_body = rheonaut_StationFrame_stop_probe_tag;
+  std::uint64_t stamp_us = 0;
+  const auto is_answered = [&] {
+    probe.body.stop_probe.station_time_us = ++stamp_us;
+    station.frames.clear();
+    EXPECT_TRUE(station.send(probe));
+    station.listen();  // within the tick in which it came
+    if (station.frames.empty() || station.frames[0].which_body != rheonaut_RobotFrame_stop_probe_answer_tag) return false;
+    return station.frames[0].body.stop_probe_answer.echo_station_time_us == stamp_us;
+  };
+  EXPECT_TRUE(is_answered());
+  const std::size_t events = station.events.size();
+  protocol::Command duty = set_duty(0.2F);
+  duty.command_id = 4711;
+  ASSERT_EQ(answer(duty), "accepted");
+  for (int i = 0; i < 100; ++i) {
+    EXPECT_TRUE(is_answered());
+    station.step();
+  }
+  EXPECT_EQ(core().duty(), 0) << "the lease of 500 ms has lapsed: a probe extends none";
+  EXPECT_EQ(answer(duty), "duplicate") << "100 probes are no commands: the id is still remembered";
+  ASSERT_EQ(answer(set_auto(0.05F)), "accepted");
+  EXPECT_TRUE(is_answered());
+  station.run(5);
+  EXPECT_EQ(mode(), "auto");
+  ASSERT_EQ(answer(emergency_stop()), "accepted");
+  const std::uint64_t latch = core().emergency_id();
+  EXPECT_TRUE(is_answered());
+  station.run(5);
+  EXPECT_EQ(mode(), "emergency");
+  EXPECT_EQ(core().emergency_id(), latch);
+  EXPECT_EQ(events_of(rheonaut_EVENT_KIND_EMERGENCY), 1);
+  EXPECT_GT(station.events.size(), events);
+}
+
+TEST_F(RobotLink, TheHelloSaysThatStopProbesAreAnswered) { EXPECT_TRUE(station.hello->answers_stop_probes); }
+
 }  // namespace
 }  // namespace robot_fw

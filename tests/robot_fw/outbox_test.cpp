@@ -49,6 +49,24 @@ TEST_F(Acks, OfStopsGoFirst) {
   EXPECT_EQ(sent(), (Numbers{3, 1, 2}));
 }
 
+// SAFETY: the answer to a probe is worth nothing unless it goes where the ack of a stop would, and it delays none.
+TEST_F(Acks, OfStopsGoBeforeTheAnswerToAStopProbeAndAllOthersAfterIt) {
+  ack(1, 1);
+  outbox.answer_stop_probe(500);
+  ack_stop(3, 3);
+  EXPECT_EQ(sent(), Numbers{3});
+  ASSERT_EQ(outbox.next(link, samples, events, 5, 0), Outgoing::stop_probe_answer);
+  EXPECT_EQ(outbox.stop_probe_us(), 500u);
+  outbox.sent(Outgoing::stop_probe_answer, 0, 0);
+  EXPECT_EQ(sent(), Numbers{1});
+}
+
+TEST_F(Acks, AStopProbeOfAnEarlierConnectionIsNotAnswered) {
+  outbox.answer_stop_probe(500);
+  outbox.welcomed(samples, events);
+  EXPECT_NE(outbox.next(link, samples, events, 5, 0), Outgoing::stop_probe_answer);
+}
+
 TEST_F(Acks, TheOldestMakesRoom) {
   ack(1, 10);
   EXPECT_EQ(sent(), (Numbers{3, 4, 5, 6, 7, 8, 9, 10}));

@@ -25,7 +25,9 @@ std::optional<Abort> fault_of(const station::CommandRecord& accepted) {
   const bool has_failed = accepted.state == CommandState::rejected || accepted.state == CommandState::expired ||
                           accepted.state == CommandState::failed || accepted.state == CommandState::superseded;
   if (!has_failed || is_unseen) return std::nullopt;
-  return Abort{"command_refused", fmt::format("{}: {} {}", accepted.kind, text(accepted.state), accepted.reason)};
+  const std::string state = text(accepted.state);
+  const std::string reason = accepted.reason.empty() || accepted.reason == state ? "" : ", " + accepted.reason;
+  return Abort{"command_refused", fmt::format("{}: {}{}", accepted.kind, state, reason)};
 }
 
 void AbortWatch::on_samples(const station::SampleBatch& batch, std::int64_t now_us) {

@@ -88,6 +88,15 @@ struct ClockEstimate {
   bool operator==(const ClockEstimate&) const = default;
 };
 
+// Whether an emergency stop would reach the robot now, by probes that take its way: link/stop_probes.hpp.
+struct StopPath {
+  bool is_measured = false;         // false: not connected since the station started, or its firmware answers no probes
+  bool is_open = false;             // a stop would arrive now
+  std::int64_t round_trip_us = 0;   // of the latest answered probe; 0: none in this connection
+  std::int64_t answered_at_us = 0;  // UTC
+  bool operator==(const StopPath&) const = default;
+};
+
 // A clock estimate as it is recorded: once a minute, and whenever it or the station's own time has jumped.
 struct ClockRecord {
   BootId boot_id = 0;
@@ -173,6 +182,7 @@ struct RobotState {
   std::uint64_t latest_robot_time_us = 0;  // of the latest frame
   std::optional<protocol::Status> status;
   ClockEstimate clock;
+  StopPath stop_path;
 
   std::vector<ChangedLimit> changed_limits;  // as the robot said last
   std::uint64_t invalid_values = 0;  // that its frames had since the station started: not finite, beyond all range

@@ -56,6 +56,20 @@ TEST_F(LiveSocketTest, StopsOneRobotOrAll) {
   EXPECT_EQ(commands(rheonaut_Command_emergency_stop_tag).size(), 2U);
 }
 
+TEST_F(LiveSocketTest, AnEchoComesBackAtOnce) {
+  const auto page = open_page();
+  page->receive("welcome");
+  page->say({{"type", "echo"}, {"stamp_us", 4711}});
+  EXPECT_EQ(page->next(), (json{{"type", "echo"}, {"stamp_us", 4711}})) << "ahead of the next stamp";
+  page->say({{"type", "echo"}});
+  EXPECT_EQ(page->receive("problem")["problem"]["status"], 400);
+}
+
+TEST_F(LiveSocketTest, TheWayOfAStopIsNullWhereItIsNotMeasured) {
+  connect_robot();
+  EXPECT_EQ(open_page()->receive("welcome")["robots"][0]["stop_path"], nullptr) << "its firmware answers no probes";
+}
+
 TEST_F(LiveSocketTest, AStopIsObeyedWhateverElseTheMessageSays) {
   connect_robot();
   const auto page = open_page();

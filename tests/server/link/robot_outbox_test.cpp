@@ -36,6 +36,7 @@ class RobotOutboxTest : public ::testing::Test {
   static std::string word(const protocol::StationFrame& frame) {
     if (frame.which_body == rheonaut_StationFrame_welcome_tag) return "welcome";
     if (frame.which_body == rheonaut_StationFrame_heartbeat_tag) return "heartbeat";
+    if (frame.which_body == rheonaut_StationFrame_stop_probe_tag) return "probe";
     const bool is_stop = frame.body.command.which_action == rheonaut_Command_emergency_stop_tag;
     return (is_stop ? "stop " : "command ") + std::to_string(frame.body.command.command_id);
   }
@@ -221,6 +222,31 @@ TEST_F(RobotOutboxTest, NothingFollowsAFrameWhoseRestIsUnsent) {
   EXPECT_EQ(word(frames[0]), "command 1");
   outbox.unsent_was_written();
   EXPECT_EQ(written(), (Words{"stop 9", "heartbeat"}));
+}
+
+// SAFETY: it shows how long a stop would take, and delays none.
+TEST_F(RobotOutboxTest, AStopProbeGoesBehindStopsAndBeforeAllElse) {
+  outbox.stop_probes().begin(now_us);
+  outbox.enqueue(command(1), kLater);
+  stop(9);
+  outbox.enqueue(command(2), kLater);
+  EXPECT_EQ(written(), (Words{"stop 9", "probe", "command 2", "heartbeat"}));
+}
+
+TEST_F(RobotOutboxTest, AtMostTwoStopProbesASecondAnsweredOrNot) {
+  outbox.stop_probes().begin(now_us);
+  std::size_t probes = 0;
+  for (const std::int64_t end_us = now_us + 10'000'000; now_us < end_us; now_us += 1000) {
+    for (const std::string& word : written()) probes += word == "probe";
+    if (now_us % 3'000'000 < 1000) outbox.stop_probes().on_answer(frames.empty() ? 0 : 1, now_us, 1);
+  }
+  EXPECT_EQ(probes, 20U);
+}
+
+TEST_F(RobotOutboxTest, ARobotThatAnswersNoStopProbesGetsNone) {
+  written();
+  now_us += 10'000'000;
+  EXPECT_EQ(written(), Words{"heartbeat"});
 }
 
 }  // namespace
