@@ -178,7 +178,8 @@ const steps = {
 
   async 'a killed station is waited for, and the page heals by itself'() {
     await bench.station.end('SIGKILL');
-    await page.locator('.top-bar .lamp.caution').waitFor();
+    await page.locator('#status.cut-off').waitFor();
+    await page.locator('#cut-off-frame').waitFor();
     await page.locator('.readouts.stale').waitFor();
     await bench.start_station();
     await page.locator('.top-bar .lamp.good').waitFor();
@@ -216,7 +217,7 @@ const steps = {
     await other.locator('#stop-line[data-phase=stopped]').waitFor();
     await picture(other, 'viewer');
 
-    await page.click('#show-access');
+    await page.click('#open-station');
     const mark = page.locator('[id^=session-]', { hasText: 'anna' });
     await mark.waitFor();
     await page.locator('#emergency-stop').waitFor(); // stays in reach
@@ -226,7 +227,7 @@ const steps = {
     await other.getByText('Open the link that the station printed').waitFor();
     await page.mouse.up();
     await until('the list forgets it', async () => (await mark.count()) === 0);
-    await page.click('#show-access');
+    await page.click('#open-robot');
     await page.locator('.annunciator h1').waitFor();
     await other.close();
   },
@@ -240,7 +241,10 @@ const steps = {
     await page.press('#password', 'Enter');
     await page.locator('.top-bar .lamp.good').waitFor();
     await page.locator('#send-setpoint').waitFor(); // an operator has the controls
-    assert.equal(await page.locator('#show-access').count(), 0, 'and not the access of others');
+    await page.click('#open-station');
+    await page.locator('#about-station').waitFor();
+    assert.equal(await page.locator('#access').count(), 0, 'and not the access of others');
+    await page.click('#open-robot');
   },
 
   async 'nothing that is smuggled into the page runs or leads elsewhere'() {

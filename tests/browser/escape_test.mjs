@@ -125,12 +125,12 @@ const steps = {
     await list.waitFor({ state: 'hidden' });
   },
 
-  async 'Escape stops in the view of who has access'() {
-    await page.click('#show-access');
+  async 'Escape stops in the view of the station'() {
+    await page.click('#open-station');
     await page.locator('#access').waitFor();
     await page.locator('#access button').first().focus();
     await escape_stops('a guarded button of the access view');
-    await page.click('#show-access');
+    await page.click('#open-robot');
     await page.locator('.annunciator h1').waitFor();
   },
 

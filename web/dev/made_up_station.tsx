@@ -5,11 +5,12 @@
 import '../src/styles';
 import { render } from 'preact';
 import type { LiveMessage, RobotState } from '../src/api';
-import { keep_menus_shut, listen_for_stop_key } from '../src/keys';
+import { keep_menus_shut, listen_for_stop_key, listen_for_view_keys } from '../src/keys';
 import type { Socket } from '../src/live';
+import { follow_address } from '../src/route';
 import { Session } from '../src/session';
 import { show_in_tab } from '../src/tab';
-import { Cockpit } from '../src/views/cockpit';
+import { Cockpit, open_view } from '../src/views/cockpit';
 
 const scene = new URLSearchParams(location.search).get('scene') ?? 'auto';
 const emergency_id = scene === 'emergency' ? '9371204588120447103' : null;
@@ -213,7 +214,9 @@ function open_socket(): Socket {
 }
 
 const session = new Session({ open_socket, is_signed_out: () => Promise.resolve(scene === 'signed_out') });
+follow_address(window);
 listen_for_stop_key(window, session.stop_selected);
+listen_for_view_keys(window, open_view);
 keep_menus_shut(window);
 session.start();
 show_in_tab(document, session);

@@ -5,12 +5,14 @@
 import type { components } from './api_types';
 import { millimetres, percent } from './format';
 import { kReasons } from './reasons';
+import type { Stamp } from './station_path';
 import { outcome_of, type StopOutcome } from './stop_outcome';
+import type { RobotStopPath } from './stop_path';
 
 type Schemas = components['schemas'];
 export type Fluid = Schemas['Fluid'];
 export type RobotModel = Schemas['RobotModel'];
-export type RobotState = Schemas['Robot'] & { retired?: boolean };
+export type RobotState = Schemas['Robot'] & { retired?: boolean; stop_path?: RobotStopPath };
 export type CommandRecord = Schemas['Command'];
 export type CommandBody = Schemas['CommandBody'];
 export type Control = Schemas['Control'];
@@ -18,14 +20,18 @@ export type ControlBody = Schemas['ControlBody'];
 export type EventRecord = Schemas['Event'];
 export type RunRecord = Schemas['Run'];
 export type Station = Schemas['Station'];
+export type Recording = Schemas['Recording'];
 export type Me = Schemas['Me'];
 export type User = Schemas['User'];
 export type Token = Schemas['Token'];
 export type PageSession = Schemas['PageSession'];
 export type Enrolment = Schemas['Enrolment'] & { retired_at_us?: number | null; retired_by?: string };
 export type SamplesMessage = Schemas['LiveSamples'];
-export type LiveMessage = Schemas['LiveServerMessage'];
-export type ClientMessage = Schemas['LiveClientMessage'];
+export type LiveMessage =
+  | Exclude<Schemas['LiveServerMessage'], { type: 'stamp' } | { type: 'welcome' }>
+  | (Schemas['LiveStamp'] & Stamp)
+  | (Schemas['LiveWelcome'] & { echoes?: boolean });
+export type ClientMessage = Schemas['LiveClientMessage'] | { type: 'echo'; stamp_us: number };
 type Problem = Schemas['Problem'];
 
 // What the station says of a stop of every robot; one of an older version says only what became of each command.
@@ -101,7 +107,11 @@ export class Api {
   };
 
   station = () => this.ask<Station>('GET', '/station');
+  recording = () => this.ask<Recording>('GET', '/recording');
   acknowledge_losses = () => this.ask<object>('POST', '/recording/losses/acknowledge');
+  events = async (robot_id: string) =>
+    (await this.ask<{ events: EventRecord[] }>('GET', `/robots/${encodeURIComponent(robot_id)}/events?limit=200`))
+      .events;
   open_runs = async () => (await this.ask<{ runs: RunRecord[] }>('GET', '/runs?state=open&limit=1000')).runs;
   // null: the station has no list; then a fluid belongs to a run alone.
   fluids = async (): Promise<Fluid[] | null> => {

@@ -19,6 +19,7 @@ export interface StopState {
   answered_after_ms: number | null;
   outcome: StopOutcome | null; // that the station answered
   problem: string; // why there is none
+  is_kept?: boolean; // nothing was answered: it goes again when the station is back
 }
 
 // `key` names the press, so that the station knows it again when it comes by the second way.
@@ -26,11 +27,20 @@ export interface StopWays {
   over_socket(robot_id: string | null, key: string): boolean;
   over_http(robot_id: string | null, key: string): Promise<StopOutcome>;
   evidence(robot_id: string | null, since_ms: number): StopEvidence; // of what was received since then
+  was_answered(error: unknown): boolean; // the station has refused, rather than not answered
   now_ms(): number;
   on_change(state: StopState): void;
 }
 
+interface Press {
+  number: number;
+  robot_id: string | null;
+  key: string;
+  pressed_at_ms: number;
+}
+
 export const kLate_ms = 1000;
+export const kKept_ms = 600_000; // a press that could not be sent goes by itself no later than this
 export const kIdleStop: StopState = {
   phase: 'idle',
   robot_id: null,
@@ -43,19 +53,35 @@ export const kIdleStop: StopState = {
 export class EmergencyStop {
   state: StopState = kIdleStop;
   private press = 0;
+  private readonly kept = new Map<string | null, Press>(); // presses that no answer has come to, one for each robot
 
   constructor(private readonly ways: StopWays) {}
 
   async stop(robot_id: string | null): Promise<void> {
-    const press = ++this.press;
-    const pressed_at_ms = this.ways.now_ms();
-    const key = new_key();
+    const press = { number: ++this.press, robot_id, key: new_key(), pressed_at_ms: this.ways.now_ms() };
+    this.kept.set(robot_id, press);
+    return this.send(press, true);
+  }
+
+  // The station is back: what it may never have received goes once more, under the same key, so that one press is one stop.
+  // Not a press of long ago: whoever made it has done something else since.
+  again(): void {
+    for (const press of [...this.kept.values()]) {
+      const is_old = this.ways.now_ms() - press.pressed_at_ms > kKept_ms;
+      const found = this.ways.evidence(press.robot_id, press.pressed_at_ms);
+      if (is_old || is_complete(found) || (found.open === 0 && found.cleared > 0)) this.drop(press);
+      else void this.send(press, false);
+    }
+  }
+
+  private async send(press: Press, is_first: boolean): Promise<void> {
+    const { robot_id, key, pressed_at_ms } = press;
     // SAFETY: both leave in this very call, before anything is drawn.
     const by_socket = sent_without_throwing(() => this.ways.over_socket(robot_id, key));
     const answer = this.ways.over_http(robot_id, key);
-    this.show({ ...kIdleStop, phase: 'sent', robot_id, pressed_at_ms });
+    if (is_first) this.show({ ...kIdleStop, phase: 'sent', robot_id, pressed_at_ms });
     const settle = (change: Partial<StopState>) => {
-      if (press !== this.press) return; // a later press shows its own state
+      if (press.number !== this.press) return; // a later press shows its own state
       this.show({
         ...kIdleStop,
         robot_id,
@@ -67,14 +93,21 @@ export class EmergencyStop {
     };
     try {
       const outcome = await answer;
+      this.drop(press);
       settle({ phase: phase_of(outcome), outcome });
     } catch (error) {
       const problem = error instanceof Error ? error.message : String(error);
+      if (this.ways.was_answered(error)) this.drop(press);
       settle({
         phase: 'failed',
         problem: by_socket ? `Sent over the live link; the second way failed: ${problem}` : problem,
+        is_kept: this.kept.get(robot_id) === press,
       });
     }
+  }
+
+  private drop(press: Press): void {
+    if (this.kept.get(press.robot_id) === press) this.kept.delete(press.robot_id);
   }
 
   // Called again and again: telemetry settles what no answer has settled, and shows when the latch is gone.
@@ -98,6 +131,7 @@ export class EmergencyStop {
   // The latch was cleared: the last stop is history.
   forget(): void {
     this.press += 1;
+    this.kept.delete(this.state.robot_id);
     this.show(kIdleStop);
   }
 

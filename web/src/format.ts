@@ -32,6 +32,14 @@ export const count = (value: number | null | undefined) =>
     ? kMissing
     : Math.round(value).toLocaleString('en').replaceAll(',', '\u202f').replace('-', kMinus);
 
+// Of a file or a disk: "640 kB", "12.4 GB".
+export function bytes(size: number): string {
+  const units = ['B', 'kB', 'MB', 'GB', 'TB'];
+  let [value, at] = [size, 0];
+  while (value >= 999.5 && at < units.length - 1) [value, at] = [value / 1000, at + 1];
+  return `${at === 0 || value >= 99.95 ? Math.round(value) : value.toFixed(1)} ${units[at]}`;
+}
+
 // The length a person typed in millimetres, in metres; null when it is no number. Comma and both minus signs are taken.
 export function parse_millimetres(text: string): number | null {
   const plain = text.trim().replace(kMinus, '-').replace(',', '.');
@@ -44,6 +52,9 @@ export const millimetres_to_m = (length_mm: number) => Number((length_mm / 1e3).
 export const m_to_millimetres = (length_m: number) => length_m * 1e3;
 export const percent_to_duty = (value_percent: number) => Number((value_percent / 100).toPrecision(12));
 export const duty_to_percent = (duty: number) => duty * 100;
+
+// A way or a wait that was measured: "0.4 ms", "38 ms".
+export const milliseconds = (time_ms: number) => `${time_ms < 9.95 ? time_ms.toFixed(1) : Math.round(time_ms)} ms`;
 
 // How long ago, in one short word: "340 ms", "2.1 s", "5 min".
 export function age(age_ms: number): string {

@@ -46,6 +46,25 @@ export function keep_menus_shut(target: Pick<Window, 'addEventListener'>): void 
   });
 }
 
+const kChord_ms = 1500;
+const kTakesLetters = 'input, textarea, select, [contenteditable], [role=combobox], [role=listbox]';
+
+// "g" and then the key of a view opens it; not while the focus is where letters belong to something else.
+export function listen_for_view_keys(target: KeyTarget, open: (key: string) => boolean): () => void {
+  let began_ms = -Infinity;
+  const listener = (event: KeyboardEvent) => {
+    const at = event.target as Partial<Element> | null;
+    const is_ours = !event.ctrlKey && !event.metaKey && !event.altKey && !event.defaultPrevented;
+    const is_second = event.timeStamp - began_ms < kChord_ms;
+    began_ms = -Infinity;
+    if (!is_ours || event.key.length !== 1 || at?.closest?.(kTakesLetters)) return;
+    if (is_second && open(event.key)) event.preventDefault();
+    else if (event.key === 'g' && !event.repeat) began_ms = event.timeStamp;
+  };
+  target.addEventListener('keydown', listener, { capture: false });
+  return () => target.removeEventListener('keydown', listener, { capture: false });
+}
+
 // Of a button that stops. SAFETY: Space never stops; it belongs to "hold to run" and to text, and a button that was
 // clicked keeps the focus. Enter presses it, once however long it is held.
 export const stop_button_keys = {

@@ -48,7 +48,7 @@ export class LiveLink {
   stamp_at_ms = -Infinity;
   private socket: Socket | null = null;
   private timer: unknown = null;
-  private heard_at_ms = 0;
+  heard_at_ms = 0; // when the latest message came
   private stopped = false;
 
   constructor(

@@ -2,13 +2,16 @@
 
 import './styles';
 import { render } from 'preact';
-import { keep_menus_shut, listen_for_stop_key } from './keys';
+import { keep_menus_shut, listen_for_stop_key, listen_for_view_keys } from './keys';
+import { follow_address } from './route';
 import { Session } from './session';
 import { show_in_tab } from './tab';
-import { Cockpit } from './views/cockpit';
+import { Cockpit, open_view } from './views/cockpit';
 
 const session = new Session();
+follow_address(window);
 listen_for_stop_key(window, session.stop_selected);
+listen_for_view_keys(window, open_view);
 keep_menus_shut(window);
 session.start();
 show_in_tab(document, session);

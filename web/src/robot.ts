@@ -109,6 +109,12 @@ export class Robot {
     return mode === 'emergency' || emergency_id !== null || (pending_stop !== null && !this.is_away.value);
   });
   readonly readout = signal<Readout>(kEmptyReadout);
+  readonly mode = computed(() => this.state.value.mode);
+  readonly emergency_id = computed(() => this.state.value.emergency_id);
+  // Connected, and its samples do not come.
+  readonly is_silent = computed(() => !this.is_away.value && this.readout.value.watched && this.readout.value.stale);
+  // Connected, and its own way for a stop is not open. Of a station that does not measure it nothing is said.
+  readonly is_unstoppable = computed(() => !this.is_away.value && this.state.value.stop_path?.is_open === false);
   private latest: SamplesMessage | null = null;
   private sampled_at_ms = -Infinity;
   private watched = true; // its samples are asked for
@@ -184,6 +190,17 @@ export class Robot {
     this.latest = message;
     this.sampled_at_ms = now_ms;
     this.note_latch(message.mode, true, now_ms);
+  }
+
+  // How old the newest sample is: from the robot's clock to now, when the station knows that clock, else since it came. null:
+  // none has come.
+  seen_age_ms(now_ms: number, station_us: number | null): number | null {
+    if (!this.watched || !this.latest) return null;
+    const since_ms = now_ms - this.sampled_at_ms;
+    const { clock, boot_id } = this.state.peek();
+    if (station_us === null || !clock || boot_id !== this.latest.boot_id) return since_ms;
+    const { robot_time_us } = end_of_samples(this.latest);
+    return Math.max(since_ms, (station_us - robot_time_us - clock.offset_us) / 1000);
   }
 
   // is_current: the page receives from the station; what it knows of a robot is old otherwise.

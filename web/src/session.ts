@@ -1,14 +1,33 @@
 // One running page: the store, the live link, the API and the controls that outlive a view, wired together.
 
-import { effect, signal } from '@preact/signals';
-import { Api, type Fluid, type Me, type RunRecord, type Station } from './api';
+import { effect, signal, untracked } from '@preact/signals';
+import {
+  Api,
+  ApiError,
+  type EventRecord,
+  type Fluid,
+  type LiveMessage,
+  type Me,
+  type Recording,
+  type RunRecord,
+  type Station,
+} from './api';
+import { alarms_of } from './alarms';
+import { Alerts, browser_alerts } from './alerts';
 import { DutyHold } from './duty_hold';
 import { EmergencyStop, kIdleStop } from './emergency';
-import { LiveLink, type LinkPhase, type Surroundings } from './live';
+import { go_to, route } from './route';
+import { kCurrent_ms, LiveLink, type LinkPhase, type Surroundings } from './live';
+import { StationPath } from './station_path';
+import { StopPath } from './stop_path';
 import { browser_shelf, ViewSettings } from './settings';
 import { kRefresh_ms, Store } from './store';
+import { browser_channel, kTell_ms, Tabs } from './tabs';
+import { Vitals } from './vitals';
 
 const kMaxWatchedAtOnce = 8; // in a larger fleet samples come of the robots that were looked at last
+const kMaxWatchedInFleet = 16; // and in the view of the fleet, of those that are in sight
+const kLook_ms = 5000; // how often the health of the recording is asked for
 const kKeepAlive_ms = 1000; // what this page controls stays its own for 3 s
 
 export class Session {
@@ -21,7 +40,6 @@ export class Session {
   readonly station = signal<Station | null>(null);
   readonly fluids = signal<Fluid[] | null>(null); // that a robot may be in; null: the station has no list of them
   readonly me = signal<Me | null>(null);
-  readonly shows_access = signal(false); // in place of the plots
   readonly phase = signal<LinkPhase>('connecting');
   readonly stop_state = signal(kIdleStop);
   readonly held = signal<{ robot_id: string | null; lapsed: boolean; error: string }>({
@@ -30,6 +48,15 @@ export class Session {
     error: '',
   });
   readonly link: LiveLink;
+  readonly path = new StationPath();
+  readonly stop_path: StopPath;
+  readonly vitals = new Vitals(this.path);
+  readonly cut_off = signal<{ since_ms: number } | null>(null); // UTC; null while the page receives from the station
+  readonly recording = signal<Recording | null>(null);
+  readonly in_sight = signal<string[]>([]); // rows of the view of the fleet
+  readonly alarms = alarms_of(this);
+  readonly alerts = new Alerts(this.settings, browser_alerts());
+  readonly tabs = new Tabs(browser_channel(), () => performance.now());
   readonly emergency: EmergencyStop;
   readonly hold: DutyHold;
 
@@ -45,16 +72,25 @@ export class Session {
         ...surroundings,
       },
       (message) => {
+        this.measure(message);
         if (message.type === 'problem') this.hold.lapse(); // the only message that it can be about, but for a stop
         this.store.receive(message);
+        if (message.type === 'welcome') this.emergency.again();
       },
       () => this.on_phase(),
     );
+    this.stop_path = new StopPath(this.path, {
+      now_ms: () => performance.now(),
+      set_timer: (callback, delay_ms) => setTimeout(callback, delay_ms),
+      clear_timer: (timer) => clearTimeout(timer as number),
+      is_live: () => this.link.phase === 'live',
+    });
     this.emergency = new EmergencyStop({
       over_socket: (robot_id, key) => this.link.send({ type: 'emergency_stop', robot_id, key }),
       over_http: (robot_id, key) =>
         robot_id === null ? this.api.emergency_stop_all(key) : this.api.emergency_stop(robot_id, key),
       evidence: (robot_id, since_ms) => this.store.stop_evidence(robot_id, since_ms),
+      was_answered: (error) => error instanceof ApiError && error.status !== 0,
       now_ms: () => performance.now(),
       on_change: (state) => (this.stop_state.value = state),
     });
@@ -76,6 +112,8 @@ export class Session {
 
   start(): void {
     this.link.start();
+    effect(() => this.follow_route());
+    effect(() => this.date_latch());
     effect(() => this.watch());
     effect(() => {
       const robot_id = this.store.selected_id.value;
@@ -83,13 +121,57 @@ export class Session {
     });
     setInterval(() => this.refresh(), kRefresh_ms);
     setInterval(() => this.keep_alive(), kKeepAlive_ms);
+    setInterval(() => this.tell_tabs(), kTell_ms);
+    setInterval(() => void this.load_recording(), kLook_ms);
+    effect(() => this.tell_tabs(this.held.value.robot_id));
+    this.alerts.follow(this.alarms);
     addEventListener('online', () => this.link.hurry());
+    for (const kind of ['focus', 'pageshow', 'resume']) addEventListener(kind, this.stop_path.look);
     document.addEventListener('visibilitychange', () => {
+      this.stop_path.look();
       if (document.hidden) this.hold.release();
       else this.link.hurry();
     });
     addEventListener('blur', () => this.hold.release());
-    addEventListener('pagehide', () => this.hold.release());
+    addEventListener('pagehide', () => {
+      this.hold.release();
+      this.tabs.leave();
+    });
+  }
+
+  // The robot of the address is the one that is selected, and the one that is selected stands in the address.
+  private follow_route(): void {
+    const { view, parts } = route.value;
+    if (view !== 'robot') return;
+    const asked_id = parts[0];
+    // SAFETY: an address is followed when it changes, never because something else has: a press must not move the selection.
+    if (asked_id !== undefined) return untracked(() => this.store.want(asked_id));
+    const chosen_id = this.store.is_chosen.value ? this.store.selected_id.value : null;
+    if (chosen_id !== null) untracked(() => go_to({ view, parts: [chosen_id] }, true));
+  }
+
+  // A latch that is older than this page: the events of the robot say since when.
+  private date_latch(): void {
+    const robot = this.store.selected.value;
+    const emergency_id = robot?.emergency_id.value ?? null;
+    if (!robot || emergency_id === null || this.phase.value !== 'live') return;
+    const { latches } = this.store;
+    if (latches.is_known(emergency_id)) return;
+    const take = (events: EventRecord[]) =>
+      events
+        .filter((event) => event.kind === 'emergency')
+        .forEach((event) => latches.note(event.emergency_id, event.received_at_us / 1000, true));
+    void this.api.events(robot.robot_id).then(take, () => undefined);
+  }
+
+  // SAFETY: the echo leaves before anything else is done with the message.
+  private measure(message: LiveMessage): void {
+    const now_ms = performance.now();
+    if (message.type === 'welcome') this.path.begin(message, now_ms);
+    else if (message.type !== 'stamp') return;
+    else if (this.path.receive(message, now_ms) && this.link.send({ type: 'echo', stamp_us: message.stamp_us }))
+      this.path.echoed(message.stamp_us, now_ms);
+    this.stop_path.look();
   }
 
   // Whatever is sent to a robot goes to the one that is selected, which stays so.
@@ -123,10 +205,20 @@ export class Session {
   };
 
   // What /live does not report: the station itself and the runs that are open.
+  private tell_tabs(duty_robot_id = this.held.peek().robot_id): void {
+    this.tabs.tell({ actor: this.store.actor.value, duty_robot_id });
+  }
+
+  private async load_recording(): Promise<void> {
+    if (this.phase.peek() !== 'live') return;
+    this.recording.value = await this.api.recording().catch(() => this.recording.peek());
+  }
+
   private async load(): Promise<void> {
     try {
       this.station.value = await this.api.station();
       this.me.value = await this.api.me();
+      void this.load_recording();
       this.fluids.value = await this.api.fluids();
       this.store.set_runs(await this.api.open_runs());
       await this.load_newest_run(this.store.selected_id.peek());
@@ -138,10 +230,16 @@ export class Session {
   // A page that stood still (a machine under load) receives first what waits for it: one refresh is let pass, never two.
   private judge_current(now_ms: number): void {
     const stood_still = now_ms - this.refreshed_at_ms > 3 * kRefresh_ms && !this.let_pass;
-    const is_current = this.link.is_current();
+    const is_current = this.link.is_current() && this.path.stamp_age_ms(now_ms) < kCurrent_ms;
     this.refreshed_at_ms = now_ms;
     this.let_pass = stood_still && !is_current;
     if (!this.let_pass) this.store.is_current.value = is_current;
+  }
+
+  private judge_cut_off(now_ms: number): void {
+    if (this.store.is_current.peek() || this.phase.peek() === 'signed_out') return void (this.cut_off.value = null);
+    const heard_ms = this.link.lost_at_ms ?? this.link.heard_at_ms;
+    if (now_ms - heard_ms >= kCurrent_ms) this.cut_off.value ??= { since_ms: Date.now() - (now_ms - heard_ms) };
   }
 
   // The newest run of a robot may be one that was interrupted.
@@ -151,8 +249,11 @@ export class Session {
   }
 
   private refresh(): void {
-    this.judge_current(performance.now());
+    const now_ms = performance.now();
+    this.judge_current(now_ms);
+    this.judge_cut_off(now_ms);
     this.store.refresh();
+    this.vitals.refresh(this.store.selected.peek(), now_ms);
     this.emergency.look();
     // A mode that takes no duty ended the hold; the hand has to press again.
     const held_id = this.hold.robot_id;
@@ -167,8 +268,13 @@ export class Session {
     if (selected_id !== null) {
       this.looked_at = [selected_id, ...this.looked_at.filter((id) => id !== selected_id)].slice(0, kMaxWatchedAtOnce);
     }
+    const in_sight = this.in_sight.value.filter((id) => this.store.find(id)?.is_away.value === false);
     if (!is_fleet || !is_live) return;
-    if (this.link.send({ type: 'watch', robots: this.looked_at })) this.store.watch(this.looked_at);
+    const watched =
+      in_sight.length === 0
+        ? this.looked_at
+        : [...new Set([...this.looked_at.slice(0, 1), ...in_sight])].slice(0, kMaxWatchedInFleet);
+    if (this.link.send({ type: 'watch', robots: watched })) this.store.watch(watched);
   }
 
   // Keeps the connection, and with a fresh stamp what this page controls.
@@ -188,9 +294,10 @@ export class Session {
     const before = this.phase.peek();
     const now = this.link.phase;
     this.phase.value = now;
+    if (now !== 'live') this.path.end();
+    this.stop_path.look();
     if (now === 'signed_out') {
       this.me.value = null;
-      this.shows_access.value = false;
     }
     if (before === 'live') {
       this.store.is_current.value = false;

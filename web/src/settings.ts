@@ -1,6 +1,7 @@
-// What this browser keeps of the view: which robots are not listed, and which notices were dismissed.
+// What this browser keeps of the view: which robots are not listed, which notices were dismissed, and whether an alarm is
+// heard or notified.
 //
-// Both only change what is drawn. SAFETY: nothing that commands or stops reads them.
+// They only change what is drawn. SAFETY: nothing that commands or stops reads them.
 
 import { signal, type Signal } from '@preact/signals';
 
@@ -52,13 +53,44 @@ class KeptSet {
   }
 }
 
+// A switch that is off until somebody turns it on.
+class KeptSwitch {
+  readonly on: Signal<boolean>;
+
+  constructor(
+    private readonly shelf: Shelf | null,
+    private readonly key: string,
+  ) {
+    let kept: string | null = null;
+    try {
+      kept = shelf?.getItem(key) ?? null;
+    } catch {
+      // as if nothing were kept
+    }
+    this.on = signal(kept === 'on');
+  }
+
+  set(on: boolean): void {
+    this.on.value = on;
+    try {
+      this.shelf?.setItem(this.key, on ? 'on' : 'off');
+    } catch {
+      // It lasts as long as the page.
+    }
+  }
+}
+
 export class ViewSettings {
+  readonly sound: KeptSwitch; // of a new alarm
+  readonly notification: KeptSwitch;
   readonly hidden_robots: KeptSet;
   readonly dismissed: KeptSet;
 
   constructor(shelf: Shelf | null) {
     this.hidden_robots = new KeptSet(shelf, 'rheonaut.hidden_robots', kMaxNames);
     this.dismissed = new KeptSet(shelf, 'rheonaut.dismissed', kMaxDismissed);
+    this.sound = new KeptSwitch(shelf, 'rheonaut.sound');
+    this.notification = new KeptSwitch(shelf, 'rheonaut.notification');
   }
 }
 

@@ -4,6 +4,8 @@
 
 import { batch, computed, signal } from '@preact/signals';
 import type { CommandRecord, EventRecord, LiveMessage, RobotState, RunRecord } from './api';
+import { natural_order } from './fleet';
+import { Latches } from './latches';
 import { Robot } from './robot';
 import type { StopEvidence } from './stop_outcome';
 
@@ -33,11 +35,14 @@ export class Store {
   readonly is_current = signal(false);
   readonly runs = signal<RunRecord[]>([]); // that are open, at most one for each robot
   readonly interrupted = signal<RunRecord[]>([]); // of each robot its newest run, if the station stopped in it
+  readonly latches = new Latches();
   readonly now_ms = signal(0); // page time, for ages
   private readonly by_id = new Map<string, Robot>();
   private pending_log: LogLine[] = [];
   private notes = 0;
-  private chosen = false; // the selection stays: by a person, or because what is selected was there
+  // The selection stays: by a person, or because what is selected was there.
+  readonly is_chosen = signal(false);
+  private wanted_id = ''; // by the address of the page
 
   constructor(private readonly clocks: { page_ms(): number; utc_ms(): number }) {}
 
@@ -46,7 +51,7 @@ export class Store {
       case 'welcome':
         batch(() => {
           this.actor.value = message.actor;
-          this.take_states(message.robots);
+          this.take_states(message.robots, false);
         });
         break;
       case 'robot':
@@ -56,13 +61,13 @@ export class Store {
         this.find(message.robot_id)?.receive(message, this.clocks.page_ms());
         break;
       case 'event':
-        this.write(this.line_of_event(message.event));
+        this.take_event(message.event);
         break;
       case 'command':
         this.write(line_of_command(message.command));
         break;
       case 'log':
-        message.events.forEach((event) => this.write(this.line_of_event(event)));
+        message.events.forEach((event) => this.take_event(event));
         message.commands.forEach((command) => this.write(line_of_command(command)));
         break;
       case 'run':
@@ -134,8 +139,10 @@ export class Store {
     return this.by_id.get(robot_id);
   }
 
-  private take_states(states: RobotState[]): void {
+  // saw_change: this page was there when what changed has changed.
+  private take_states(states: RobotState[], saw_change = true): void {
     const now_ms = this.clocks.page_ms();
+    for (const state of states) this.latches.note(state.emergency_id, this.clocks.utc_ms(), saw_change);
     const known_before = this.by_id.size;
     for (const state of states) {
       const known = this.by_id.get(state.robot_id);
@@ -143,7 +150,7 @@ export class Store {
       else this.by_id.set(state.robot_id, new Robot(state, now_ms));
     }
     if (this.by_id.size > known_before) {
-      const ordered = [...this.by_id].sort(([a], [b]) => (a < b ? -1 : 1));
+      const ordered = [...this.by_id].sort(([a], [b]) => natural_order(a, b));
       this.robots.value = ordered.map(([, robot]) => robot);
     }
     this.select_by_itself();
@@ -165,23 +172,38 @@ export class Store {
   }
 
   select(robot_id: string): void {
-    this.chosen = true;
-    this.selected_id.value = robot_id;
+    batch(() => {
+      this.is_chosen.value = true;
+      this.selected_id.value = robot_id;
+    });
+  }
+
+  // A robot that may not be known yet. SAFETY: it is selected at once, or while nothing else is: when it appears later, the
+  // stop button keeps the name that somebody may be about to press.
+  want(robot_id: string): void {
+    if (this.by_id.has(robot_id)) this.select(robot_id);
+    else this.wanted_id = robot_id;
   }
 
   // Whoever orders something of the robot that is selected has chosen it.
   keep_selected(): void {
-    this.chosen ||= this.selected_id.peek() !== null;
+    if (this.selected_id.peek() !== null) this.is_chosen.value = true;
   }
 
   // Until a person chooses, the page shows a connected robot rather than one that was never there.
   // SAFETY: one that was connected stays selected when its link breaks: Escape is meant for it, not for another one.
   private select_by_itself(): void {
-    if (this.chosen) return;
+    if (this.is_chosen.peek()) return;
+    if (this.by_id.has(this.wanted_id)) return this.select(this.wanted_id);
     const robots = this.robots.peek();
     const best = robots.find((robot) => !robot.is_away.peek()) ?? this.selected.peek() ?? robots[0];
     this.selected_id.value = best?.robot_id ?? null;
-    this.chosen = best !== undefined && !best.is_away.peek();
+    this.is_chosen.value = best !== undefined && !best.is_away.peek();
+  }
+
+  private take_event(event: EventRecord): void {
+    if (event.kind === 'emergency') this.latches.note(event.emergency_id, event.received_at_us / 1000, true);
+    this.write(this.line_of_event(event));
   }
 
   private line_of_event(event: EventRecord): LogLine {

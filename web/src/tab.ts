@@ -1,32 +1,40 @@
-// What the tab says to whoever looks elsewhere: an emergency, and that the page is cut off, in title and icon.
+// What the tab says to whoever looks elsewhere: the worst of all robots and of the connection, in title and icon.
 //
 // It follows the states that the station reports, which reach a tab in the background at once; timers there are slow.
 
 import { computed, effect } from '@preact/signals';
+import type { Alarm } from './alarms';
 import type { Session } from './session';
 
 export const kName = 'Rheonaut';
 
-export function tab_title(alarms: string[], is_cut_off: boolean): string {
-  if (alarms.length > 0) return `EMERGENCY ${alarms.length === 1 ? alarms[0] : `${alarms.length} robots`} · ${kName}`;
-  return is_cut_off ? `Cut off · ${kName}` : kName;
+export interface TabSign {
+  title: string;
+  icon: string;
 }
 
-// A robot that is away and hidden no longer calls.
-export function alarms_of(session: Session): string[] {
-  const hidden = session.settings.hidden_robots.names.value;
-  return session.store.robots.value
-    .filter((robot) => robot.is_alarming.value && !(robot.is_away.value && hidden.has(robot.robot_id)))
-    .map((robot) => robot.robot_id);
+// An emergency hides everything else, being cut off everything but that.
+export function tab_sign(alarms: readonly Alarm[], is_cut_off: boolean): TabSign {
+  const of = (key: string) => alarms.filter((alarm) => alarm.key.startsWith(`${key} `));
+  const names = (found: Alarm[]) => (found.length === 1 ? found[0]?.robot_id : `${found.length} robots`);
+  const emergencies = of('emergency');
+  if (emergencies.length > 0)
+    return { title: `EMERGENCY ${names(emergencies)} · ${kName}`, icon: '/favicon_emergency.svg' };
+  if (is_cut_off) return { title: `Cut off · ${kName}`, icon: '/favicon_cut_off.svg' };
+  const [worst] = alarms;
+  if (worst?.level === 'alarm')
+    return { title: `Alarm ${worst.robot_id ?? ''} · ${kName}`, icon: '/favicon_caution.svg' };
+  if (worst) return { title: kName, icon: '/favicon_caution.svg' };
+  return { title: kName, icon: '/favicon.svg' };
 }
 
 export function show_in_tab(page: Document, session: Session): void {
   const is_cut_off = () => session.station.value !== null && ['connecting', 'waiting'].includes(session.phase.value);
-  const title = computed(() => tab_title(alarms_of(session), is_cut_off()));
+  const sign = computed(() => tab_sign(session.alarms.value, is_cut_off() || session.cut_off.value !== null));
   effect(() => {
-    page.title = title.value;
-    const icon = page.querySelector<HTMLLinkElement>('link[rel=icon]');
-    const file = title.value.startsWith('EMERGENCY') ? '/favicon_emergency.svg' : '/favicon.svg';
-    if (icon && icon.getAttribute('href') !== file) icon.setAttribute('href', file);
+    const { title, icon } = sign.value;
+    page.title = title;
+    const link = page.querySelector<HTMLLinkElement>('link[rel=icon]');
+    if (link && link.getAttribute('href') !== icon) link.setAttribute('href', icon);
   });
 }

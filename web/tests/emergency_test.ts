@@ -1,7 +1,7 @@
 // The emergency stop and its key.
 import { expect, test } from 'vitest';
 import type { CommandRecord } from '../src/api';
-import { EmergencyStop, kLate_ms, type StopState } from '../src/emergency';
+import { EmergencyStop, kKept_ms, kLate_ms, type StopState } from '../src/emergency';
 import { kFullScreenNote, kShortcuts, listen_for_stop_key } from '../src/keys';
 import { outcome_of, type StopEvidence } from '../src/stop_outcome';
 import { settle } from './fakes';
@@ -24,6 +24,7 @@ function stop_with(over_http: () => Promise<CommandRecord[]>, over_socket: () =>
       return over_http().then(outcome_of);
     },
     evidence: () => world.evidence,
+    was_answered: (error) => (error as Error).message.startsWith('refused'),
     now_ms: () => world.now_ms,
     on_change: (state) => world.states.push(state),
   });
@@ -185,4 +186,46 @@ test('the list of keys says that Space never stops, and who keeps Escape in full
 
 test('typing does not stop', () => {
   for (const key of ['a', ' ', 'Enter', 'Backspace', '1']) expect(press(key)).toEqual({ stops: 0, prevented: false });
+});
+
+test('a press that nothing has answered goes again when the station is back, as the same press', async () => {
+  let is_back = false;
+  const { emergency, world } = stop_with(() =>
+    is_back ? Promise.resolve([record('acknowledged')]) : Promise.reject(new Error('The station did not answer.')),
+  );
+  await emergency.stop('rheo-1');
+  expect(emergency.state).toMatchObject({ phase: 'failed', is_kept: true });
+  is_back = true;
+  emergency.again();
+  await settle();
+  expect(new Set(world.keys).size).toBe(1);
+  expect(world.ways).toHaveLength(4);
+  expect(emergency.state.phase).toBe('stopped');
+  emergency.again();
+  expect(world.ways).toHaveLength(4); // it has been answered
+});
+
+test('one that was refused, that telemetry has shown, or that is old, does not go again', async () => {
+  const away = () => Promise.reject(new Error('The station did not answer.'));
+  const refused = stop_with(() => Promise.reject(new Error('refused')));
+  await refused.emergency.stop('rheo-1');
+  const seen = stop_with(away);
+  await seen.emergency.stop('rheo-1');
+  seen.world.evidence = { latched: 0, kept: 0, cleared: 1, open: 0 };
+  const old = stop_with(away);
+  await old.emergency.stop('rheo-1');
+  old.world.now_ms = kKept_ms + 1;
+  for (const { emergency, world } of [refused, seen, old]) {
+    emergency.again();
+    expect(world.ways).toHaveLength(2);
+  }
+});
+
+test('each robot has its own press that goes again', async () => {
+  const { emergency, world } = stop_with(() => Promise.reject(new Error('The station did not answer.')));
+  await emergency.stop('a');
+  await emergency.stop('b');
+  world.ways.length = 0;
+  emergency.again();
+  expect(world.ways).toEqual(['socket a', 'http a', 'socket b', 'http b']);
 });

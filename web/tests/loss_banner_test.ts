@@ -3,7 +3,7 @@ import { signal } from '@preact/signals';
 import { h, render } from 'preact';
 import { afterEach, beforeEach, expect, test, vi } from 'vitest';
 import type { Station } from '../src/api';
-import { TopBar } from '../src/parts/top_bar';
+import { Notices } from '../src/parts/top_bar';
 import type { Session } from '../src/session';
 import { Store } from '../src/store';
 import { fake_document, FakeNode } from './fake_dom';
@@ -33,12 +33,11 @@ function drawn_for(role: string, problems: string[]) {
     station,
     phase: signal('live'),
     me: signal({ role, user: 'anna', actor: 'user:anna/session:1' }),
-    shows_access: signal(false),
     link: { attempt: 0, lost_at_ms: null },
     api: { acknowledge_losses: () => Promise.resolve({}), station: () => Promise.resolve(station_with([])) },
   } as unknown as Session;
   const page = new FakeNode(1, 'body');
-  render(h(TopBar, { session }), page as unknown as Element);
+  render(h(Notices, { session }), page as unknown as Element);
   return page;
 }
 

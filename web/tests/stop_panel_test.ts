@@ -14,6 +14,7 @@ beforeEach(() => {
   vi.useFakeTimers();
   vi.stubGlobal('document', fake_document);
   vi.stubGlobal('window', globalThis);
+  for (const name of ['addEventListener', 'removeEventListener']) vi.stubGlobal(name, () => undefined);
 });
 afterEach(() => {
   vi.unstubAllGlobals();
@@ -39,10 +40,14 @@ function drawn_with(state: RobotState) {
   store.is_current.value = true;
   store.refresh();
   const cleared: string[] = [];
+  const pressed: string[] = [];
   const session = {
     store,
     me: signal({ role: 'operator' }),
+    stop_path: { hindrance: signal(null) },
+    vitals: { now: signal({ page_ms: null, robot_ms: null, seen_ms: null }) },
     stop_state: signal(kIdleStop),
+    stop_selected: () => void pressed.push('stop'),
     emergency: { forget: () => undefined },
     api: { clear_emergency: (_: string, id: string) => Promise.resolve(void cleared.push(id)) },
   } as unknown as Session;
@@ -52,7 +57,7 @@ function drawn_with(state: RobotState) {
     store.receive({ type: 'robot', robot: next });
     store.refresh();
   };
-  return { page, receive, cleared };
+  return { page, receive, cleared, pressed, session };
 }
 
 test('the latch is cleared by a hold of a whole second', async () => {
@@ -73,6 +78,40 @@ test('a hold that began before another emergency clears neither', async () => {
   await vi.advanceTimersByTimeAsync(900);
   receive(latched('B'));
   await vi.advanceTimersByTimeAsync(5 * kGuard_ms);
-  expect(page.find('clear-emergency')!.text).toContain('B');
+  expect(page.find('latch')!.attributes['data-emergency-id']).toBe('B');
   expect(cleared).toEqual([]);
+});
+
+test('a latch is named by its time and cause, never by its number', () => {
+  const { page } = drawn_with(latched('9371204588120447103'));
+  expect(page.find('latch')!.text).toMatch(/a operator, before \d\d:\d\d:\d\d/); // it was there before the page
+  expect(page.find('clear-emergency')!.text).toMatch(/^Hold 1 s to clear: operator, before/);
+  expect(page.text).not.toContain('447103');
+});
+
+test('a page that saw it begin knows when', async () => {
+  const { page, receive } = drawn_with({ ...latched('A'), mode: 'manual', emergency_id: null });
+  receive(latched('B'));
+  await vi.advanceTimersByTimeAsync(100);
+  expect(page.find('clear-emergency')!.text).toMatch(/^Hold 1 s to clear: operator, \d\d:\d\d:\d\d$/);
+});
+
+// SAFETY: what would not work now never looks as if it did, and is never out of use.
+test('a stop that would not work now says so, and can be pressed all the same', async () => {
+  const { page, session, pressed } = drawn_with(latched('A'));
+  const button = page.find('emergency-stop')!;
+  expect(button.attributes['data-works']).toBe('true');
+  expect(page.text).not.toContain('will be sent');
+  session.stop_path.hindrance.value = 'silent';
+  await vi.advanceTimersByTimeAsync(50);
+  expect(button.attributes['data-works']).toBe('false');
+  expect(page.find('stop-path')!.text).toBe('will be sent when the station answers');
+  expect(button.attributes['disabled']).toBeUndefined();
+  button.fire('PointerDown');
+  expect(pressed).toHaveLength(1);
+});
+
+test('it is called a stop function, not an emergency-stop device', () => {
+  const { page } = drawn_with(latched('A'));
+  expect(page.find('show-stop-note')!.text).toBe('A stop function, not an emergency-stop device');
 });

@@ -1,6 +1,7 @@
 // What the page knows: numerals, stale marks, the log, selection.
 import { expect, test } from 'vitest';
 import type { CommandRecord, EventRecord, RobotState, RunRecord } from '../src/api';
+import { natural_order } from '../src/fleet';
 import { kLogLines, Store } from '../src/store';
 import { batch } from './fakes';
 
@@ -333,6 +334,6 @@ test('of a stop of every robot a retired one counts only while it is connected',
 test('621 robots are taken in order, in one welcome', () => {
   const { store } = store_with(...Array.from({ length: 621 }, (_, n) => robot(`r-${(n * 7919) % 1000}`)));
   const ids = store.robots.value.map((each) => each.state.value.robot_id);
-  expect(ids).toEqual([...ids].sort());
+  expect(ids).toEqual([...ids].sort(natural_order));
   expect(ids).toHaveLength(621);
 });

@@ -3,6 +3,9 @@
 import { useSignal } from '@preact/signals';
 import { useEffect, useRef } from 'preact/hooks';
 import { kFullScreenNote, kShortcuts, useCloseOnEscape } from '../keys';
+import { kViews } from '../views/table';
+
+const view_keys = kViews.map(({ key, title }) => ({ keys: ['g', key], what: `Opens ${title}.` }));
 
 export function KeyList() {
   const open = useSignal(false);
@@ -27,7 +30,7 @@ export function KeyList() {
       </button>
       <section class="key-list" id="key-list" aria-label="Keys" hidden={!open.value}>
         <dl>
-          {kShortcuts.map(({ keys, what }) => (
+          {[...kShortcuts, ...view_keys].map(({ keys, what }) => (
             <div key={keys.join()}>
               <dt>
                 {keys.map((key) => (

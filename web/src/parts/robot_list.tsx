@@ -6,18 +6,22 @@
 import { useComputed, useSignal } from '@preact/signals';
 import { millimetres, plus_minus } from '../format';
 import type { Robot } from '../robot';
+import { go_to } from '../route';
 import type { Session } from '../session';
+
+// Not listed here: hidden by somebody, or retired and away. The one that is selected never is.
+export const is_hidden = ({ store, settings }: Session, robot: Robot) =>
+  robot.robot_id !== store.selected_id.value &&
+  (settings.hidden_robots.names.value.has(robot.robot_id) || robot.is_left_out.value);
 
 export function RobotList({ session }: { session: Session }) {
   const { store, settings } = session;
   const edits = useSignal(false);
-  const is_hidden = (robot: Robot) =>
-    robot.robot_id !== store.selected_id.value &&
-    (settings.hidden_robots.names.value.has(robot.robot_id) || robot.is_left_out.value);
-  const shown = useComputed(() => store.robots.value.filter((robot) => edits.value || !is_hidden(robot)));
-  const hidden = useComputed(() => store.robots.value.filter(is_hidden).length);
+  const hidden_here = (robot: Robot) => is_hidden(session, robot);
+  const shown = useComputed(() => store.robots.value.filter((robot) => edits.value || !hidden_here(robot)));
+  const hidden = useComputed(() => store.robots.value.filter(hidden_here).length);
   const alarms = useComputed(
-    () => store.robots.value.filter((robot) => is_hidden(robot) && robot.is_alarming.value).length,
+    () => store.robots.value.filter((robot) => hidden_here(robot) && robot.is_alarming.value).length,
   );
   const hide_away = () => {
     const away = store.robots.peek().filter((robot) => robot.is_away.peek());
@@ -90,7 +94,7 @@ function RobotEntry({ session, robot }: { session: Session; robot: Robot }) {
       class="robot-entry"
       aria-pressed={store.selected_id.value === robot_id}
       data-tone={tone}
-      onClick={() => store.select(robot_id)}
+      onClick={() => go_to({ view: 'robot', parts: [robot_id] })}
     >
       <span class={`dot ${tone}`} />
       <span class="name">{robot_id}</span>
@@ -104,7 +108,7 @@ function RobotEntry({ session, robot }: { session: Session; robot: Robot }) {
   );
 }
 
-function HideButton({ session, robot_id }: { session: Session; robot_id: string }) {
+export function HideButton({ session, robot_id }: { session: Session; robot_id: string }) {
   const { hidden_robots } = session.settings;
   const is_hidden = hidden_robots.names.value.has(robot_id);
   return (

@@ -1,35 +1,48 @@
-// The emergency stop: one action, always in reach; below it the guarded way out of a latch, and what became of the stop.
+// The stop: one action, always in reach, with the way that it would take now; below it the guarded way out of a latch, and
+// what became of the stop.
 
-import { age, words } from '../format';
 import { stop_button_keys } from '../keys';
-import type { Robot } from '../robot';
 import type { Session } from '../session';
 import { words_of_all } from '../stop_outcome';
-import { GuardedButton } from './hold_button';
-import { OutcomeLine, useAsking } from './request';
+import { latency_text, readiness_of } from '../stop_path';
+import { Latch } from './latch';
+import { StopNote } from './stop_note';
 
 export function StopPanel({ session }: { session: Session }) {
   const robot = session.store.selected.value;
+  const readiness = readiness_of(
+    session.stop_path.hindrance.value,
+    session.vitals.now.value.page_ms,
+    robot && robot.state.value,
+  );
+  const who = robot ? robot.robot_id : 'every robot';
   return (
-    <section class="stop-panel" aria-label="Emergency stop">
-      {/* SAFETY: acts when it goes down, not when it comes up again; Enter or a tool acts too, Space does not. */}
+    <section class="stop-panel" aria-label="Stop">
+      {/* SAFETY: acts when it goes down, not when it comes up again; Enter or a tool acts too, Space does not. It is never
+          disabled: what cannot be sent now is sent when it can. */}
       <button
         type="button"
         id="emergency-stop"
-        class="emergency-stop"
+        class={`emergency-stop ${readiness.works ? '' : 'hindered'}`}
         aria-keyshortcuts="Escape"
+        aria-describedby="stop-path"
+        data-works={readiness.works}
         {...stop_button_keys}
         onPointerDown={(event) => event.button === 0 && session.stop_selected()}
         onClick={(event) => event.detail === 0 && session.stop_selected()}
       >
-        <b>Emergency stop</b>
-        <span>
-          {robot ? `stops ${robot.state.value.robot_id}` : 'stops every robot'} <kbd>Esc</kbd>
+        <b>Stop</b>
+        <span class="whom">
+          stops {who} <kbd>Esc</kbd>
+        </span>
+        <span class="path" id="stop-path" title={readiness.why || readiness.parts}>
+          {readiness.works ? latency_text(readiness) : readiness.text}
         </span>
       </button>
       <div class="stop-below">
-        {robot && <Latch session={session} robot={robot} key={robot.state.value.robot_id} />}
+        {robot && <Latch session={session} robot={robot} key={robot.robot_id} />}
         <StopLine session={session} />
+        <StopNote why={readiness.why} parts={readiness.parts} />
       </div>
     </section>
   );
@@ -51,8 +64,10 @@ function StopLine({ session }: { session: Session }) {
   );
 }
 
+const kKept = 'It goes again by itself when the station answers.';
+
 function stop_text(session: Session): string {
-  const { phase, robot_id, answered_after_ms, outcome, problem } = session.stop_state.value;
+  const { phase, robot_id, answered_after_ms, outcome, problem, is_kept } = session.stop_state.value;
   const who = robot_id ?? 'every robot';
   const ms = `${Math.round(answered_after_ms ?? 0)} ms`;
   const may_not = 'The stop may not have arrived:';
@@ -82,85 +97,6 @@ function stop_text(session: Session): string {
       return `Sent, but ${who} has not answered yet. It is kept and sent first until it does.`;
     case 'failed':
       if (robot_id === null && outcome) return words_of_all(outcome, ms);
-      return `${may_not} ${outcome?.reason ?? problem} ${what_to_do}`;
+      return `${may_not} ${outcome?.reason ?? problem} ${is_kept ? `${kKept} ` : ''}${what_to_do}`;
   }
-}
-
-// SAFETY: only whoever is in control may clear, and only on a picture that is current; the station checks it again.
-export function may_clear(session: Session, robot: Robot): boolean {
-  const { control, link } = robot.state.value;
-  const me = session.me.value;
-  const is_free_or_mine = control === null || control.holder === session.store.actor.value;
-  return (
-    session.store.is_current.value && link === 'connected' && me !== null && me.role !== 'viewer' && is_free_or_mine
-  );
-}
-
-function Latch({ session, robot }: { session: Session; robot: Robot }) {
-  const asking = useAsking();
-  const { robot_id, emergency_cause, pending_stop, link } = robot.state.value;
-  const { emergency_id, mode, stale, sample_age_ms } = robot.readout.value;
-  const known_id = emergency_id ?? robot.state.value.emergency_id;
-  if (mode !== 'emergency' && pending_stop === null) {
-    return asking.outcome.value.phase === 'idle' ? null : <OutcomeLine asking={asking} />;
-  }
-  const clear = (id: string) =>
-    asking
-      .ask(`Clear ${id}`, () => session.api.clear_emergency(robot_id, id))
-      .then((cleared) => cleared && session.emergency.forget());
-  return (
-    <div class="latch" id="latch" data-emergency-id={known_id ?? ''}>
-      <h2>{mode === 'emergency' ? 'Latched: the motor stays off' : 'Stop not acknowledged yet'}</h2>
-      <dl>
-        <div>
-          <dt>Cause</dt>
-          <dd>{mode === 'emergency' ? words(emergency_cause) : 'operator'}</dd>
-        </div>
-        <div>
-          <dt>Emergency</dt>
-          <dd class="id">{known_id ?? 'not known yet'}</dd>
-        </div>
-      </dl>
-      {pending_stop !== null && (
-        <p>
-          {link === 'connected'
-            ? 'Sent; waiting for the robot.'
-            : 'Kept: will be delivered first when the robot returns.'}
-        </p>
-      )}
-      {stale && Number.isFinite(sample_age_ms) && <p>Last sample {age(sample_age_ms)} ago.</p>}
-      {known_id !== null && pending_stop === null && (
-        <>
-          <WhoMayClear session={session} robot={robot} />
-          {/* SAFETY: of another emergency it is another button: a hold that began before it clears nothing. */}
-          <GuardedButton
-            key={known_id}
-            id="clear-emergency"
-            disabled={!may_clear(session, robot) || asking.pending}
-            on_held={() => void clear(known_id)}
-          >
-            Hold 1 s to clear {known_id.slice(-6).padStart(7, '…')}
-          </GuardedButton>
-        </>
-      )}
-      <OutcomeLine asking={asking} />
-    </div>
-  );
-}
-
-// Why the button below does nothing, if so.
-function WhoMayClear({ session, robot }: { session: Session; robot: Robot }) {
-  if (may_clear(session, robot)) return null;
-  const { control, link } = robot.state.value;
-  const { store, me } = session;
-  const text = !store.is_current.value
-    ? 'Cut off from the station: nothing can be cleared from here.'
-    : link !== 'connected'
-      ? 'The robot is not connected.'
-      : control !== null && control.holder !== store.actor.value
-        ? `${control.holder} is in control and may clear it.`
-        : me.value?.role === 'viewer'
-          ? 'An operator may clear it.'
-          : '';
-  return <p class="may-clear">{text}</p>;
 }

@@ -1,7 +1,7 @@
 // A horizontal scale as on an altimeter tape: ticks, the robot as a pointer, reference and setpoint as bugs.
 
 import { useRef } from 'preact/hooks';
-import { next_range, range_splits, round_step } from '../chart';
+import { next_range, range_splits, round_step } from '../range';
 import { kSpread_sd, m_to_millimetres } from '../format';
 import type { Robot } from '../robot';
 

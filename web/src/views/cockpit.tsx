@@ -1,81 +1,97 @@
-// The cockpit: one page with everything an operator watches and touches, and the stop always in reach.
+// The shell of the page: what stands in the same place whatever is looked at. The stop above all; its code is loaded with
+// the page, never later.
 
-import { Access } from './access';
-import { SignedOut } from './signed_out';
-import { ControlLine } from '../parts/control_line';
-import { AutoControl } from '../parts/auto_control';
-import { LinkPanel } from '../parts/link_panel';
-import { LogStrip } from '../parts/log_strip';
-import { ManualControl } from '../parts/manual_control';
-import { ModeAnnunciator } from '../parts/mode_annunciator';
-import { Plots } from '../parts/plots';
-import { Readouts } from '../parts/readouts';
-import { RobotList } from '../parts/robot_list';
-import { RunControl } from '../parts/run_control';
+import { useComputed } from '@preact/signals';
 import { StopPanel } from '../parts/stop_panel';
 import { TopBar } from '../parts/top_bar';
+import { format, go_to, route } from '../route';
 import type { Session } from '../session';
+import { ViewLoader } from './loader';
+import { SignedOut } from './signed_out';
+import { kViews, view_named, type View } from './table';
+
+const loader = new ViewLoader((callback, delay_ms) => setTimeout(callback, delay_ms));
+
+// By the key of a view; false: there is none with this key.
+export function open_view(key: string): boolean {
+  const view = kViews.find((each) => each.key === key);
+  if (view) go_to({ view: view.name });
+  return view !== undefined;
+}
 
 export function Cockpit({ session }: { session: Session }) {
+  const name = useComputed(() => route.value.view).value;
   if (session.phase.value === 'signed_out') return <SignedOut session={session} />;
-  const may_command = session.me.value?.role !== 'viewer';
-  const robot = session.store.selected.value;
-  const key = session.store.selected_id.value; // controls begin anew with another robot
+  const view = view_named(name);
+  const module = view ? loader.of(view).value.module : null;
+  const View = module?.default;
+  const Hands = module?.Hands;
   return (
-    <div class="cockpit">
+    <div class={`cockpit ${name === 'robot' ? 'of-robot' : 'of-view'}`}>
       <TopBar session={session} />
-      <aside class="side">
-        <RobotList session={session} />
-        {robot && <LinkPanel robot={robot} />}
-      </aside>
-      <main class="scope" aria-label={robot ? `Robot ${key}` : 'No robot'}>
-        {session.shows_access.value ? (
-          <Access session={session} />
-        ) : robot ? (
-          <>
-            <ModeAnnunciator robot={robot} is_current={session.store.is_current.value} />
-            <Readouts robot={robot} />
-            <Plots robot={robot} />
-          </>
+      <div class="view">
+        {View ? (
+          <View key={name} session={session} route={route.value} />
+        ) : view ? (
+          <NotLoaded session={session} view={view} />
         ) : (
-          <Waiting session={session} />
+          <NoSuchView />
         )}
-      </main>
+      </div>
       <div class="hands">
         <StopPanel session={session} />
-        <section class="controls" aria-label="Controls">
-          {robot && <ControlLine key={`control-${key}`} session={session} robot={robot} />}
-          {robot && !may_command && (
-            <p class="viewer-note quiet">You may look and stop. Commands and runs need the role operator.</p>
-          )}
-          {robot && may_command && (
-            <>
-              <AutoControl key={`auto-${key}`} session={session} robot={robot} />
-              <ManualControl key={`manual-${key}`} session={session} robot={robot} />
-              <RunControl key={`run-${key}`} session={session} robot={robot} />
-            </>
-          )}
-        </section>
+        {Hands && (
+          <section class="controls" aria-label="Controls">
+            <Hands session={session} route={route.value} />
+          </section>
+        )}
       </div>
-      <LogStrip session={session} />
+      {session.cut_off.value && <div class="cut-off-frame" id="cut-off-frame" />}
     </div>
   );
 }
 
-function Waiting({ session }: { session: Session }) {
-  const address = session.station.value?.robots_address;
+// It is loaded again each second, so that it comes by itself when the station does.
+function NotLoaded({ session, view }: { session: Session; view: View }) {
+  const { failures } = loader.of(view).value;
+  const is_live = session.store.is_current.value;
   return (
-    <div class="waiting">
-      <h2>No robot yet</h2>
-      <p>
-        Robots connect to the station by themselves
-        {address && (
-          <>
-            , at <code>{address}</code>
-          </>
-        )}
-        . The first one that does is shown here.
-      </p>
-    </div>
+    <main class="view-body" aria-label={view.title}>
+      {failures > 0 && (
+        <div class="waiting" id="not-loaded" role="status">
+          <h2>{view.title} could not be loaded</h2>
+          <p>
+            {is_live
+              ? 'The station has another version of this page, perhaps since an update.'
+              : 'The station does not answer. It is tried again each second, and this view comes by itself.'}
+          </p>
+          {is_live && (
+            <button type="button" class="primary" id="load-again" onClick={() => location.reload()}>
+              Load the page anew
+            </button>
+          )}
+        </div>
+      )}
+    </main>
+  );
+}
+
+function NoSuchView() {
+  return (
+    <main class="view-body" aria-label="Not found">
+      <div class="waiting" id="no-such-view">
+        <h2>Nothing is at this address</h2>
+        <p>
+          <code>{format(route.value)}</code> names no view of this page. There are:
+        </p>
+        <ul>
+          {kViews.map(({ name, title }) => (
+            <li key={name}>
+              <a href={format({ view: name })}>{title}</a>
+            </li>
+          ))}
+        </ul>
+      </div>
+    </main>
   );
 }

@@ -1,8 +1,6 @@
 // Ranges of the charts.
-import { expect, test, vi } from 'vitest';
-
-vi.mock('uplot', () => ({ default: class {} })); // wants a page; the ranges do not
-const { next_range, range_splits, round_step } = await import('../src/chart');
+import { expect, test } from 'vitest';
+import { next_range, range_splits, round_step } from '../src/range';
 
 test('a range has round ends around the data', () => {
   const [from, to] = next_range([-0.04, 0.04], 0, 0.101, 0.08);

@@ -1,0 +1,82 @@
+// Sound and notification of a new alarm, for whoever looks elsewhere. Both are off until somebody turns them on.
+
+import { effect, signal, type ReadonlySignal } from '@preact/signals';
+import type { Alarm } from './alarms';
+import type { ViewSettings } from './settings';
+
+export interface AlertWays {
+  beep(): void;
+  notify(title: string, text: string): void;
+  ask(): Promise<boolean>; // whether the browser may notify
+}
+
+export class Alerts {
+  readonly problem = signal(''); // why notification is not on
+  private known = new Set<string>();
+
+  constructor(
+    readonly settings: Pick<ViewSettings, 'sound' | 'notification'>,
+    private readonly ways: AlertWays,
+  ) {}
+
+  follow(alarms: ReadonlySignal<Alarm[]>): () => void {
+    return effect(() => this.take(alarms.value.filter((alarm) => alarm.level === 'alarm')));
+  }
+
+  // By a person: the sound is heard at once, so that its loudness is known.
+  set_sound(on: boolean): void {
+    this.settings.sound.set(on);
+    if (on) this.ways.beep();
+  }
+
+  async set_notification(on: boolean): Promise<void> {
+    this.problem.value = '';
+    const may = on && (await this.ways.ask());
+    if (on && !may)
+      this.problem.value = 'The browser does not allow it for this page (it needs HTTPS or this machine).';
+    this.settings.notification.set(may);
+  }
+
+  private take(alarms: Alarm[]): void {
+    const fresh = alarms.filter((alarm) => !this.known.has(alarm.key));
+    this.known = new Set(alarms.map((alarm) => alarm.key));
+    if (fresh.length === 0) return;
+    if (this.settings.sound.on.peek()) this.ways.beep();
+    const text = fresh.map(({ robot_id, text }) => (robot_id === null ? text : `${robot_id}: ${text}`)).join('\n');
+    if (this.settings.notification.on.peek()) this.ways.notify('Rheonaut', text);
+  }
+}
+
+// Three short tones, made by the browser itself. It plays none before the first press on a page.
+export function browser_alerts(): AlertWays {
+  let audio: AudioContext | null = null;
+  return {
+    beep() {
+      audio ??= new AudioContext();
+      void audio.resume().then(() => [0, 0.22, 0.44].forEach((at_s) => audio && tone(audio, audio.currentTime + at_s)));
+    },
+    notify(title, text) {
+      try {
+        new Notification(title, { body: text, tag: 'rheonaut', icon: '/favicon_emergency.svg' });
+      } catch {
+        // Some telephones allow it to no page that is open.
+      }
+    },
+    async ask() {
+      if (typeof Notification === 'undefined' || !isSecureContext) return false;
+      return (await Notification.requestPermission()) === 'granted';
+    },
+  };
+}
+
+function tone(audio: AudioContext, at_s: number): void {
+  const [source, loudness] = [audio.createOscillator(), audio.createGain()];
+  source.frequency.value = 880;
+  loudness.gain.setValueAtTime(0, at_s);
+  loudness.gain.linearRampToValueAtTime(0.25, at_s + 0.01);
+  loudness.gain.setValueAtTime(0.25, at_s + 0.12);
+  loudness.gain.linearRampToValueAtTime(0, at_s + 0.15);
+  source.connect(loudness).connect(audio.destination);
+  source.start(at_s);
+  source.stop(at_s + 0.16);
+}
