@@ -10,5 +10,8 @@ import './style/panels.css';
 import './style/readouts.css';
 import './style/charts.css';
 import './style/controls.css';
+import './style/runs.css';
+import './style/run.css';
+import './style/run_record.css';
 import './style/stop.css';
 import './style/small_screens.css';

@@ -27,6 +27,7 @@ export interface View {
 
 export const kViews: readonly View[] = [
   { name: 'robot', title: 'Robot', key: 'r', load: () => import('./robot') },
+  { name: 'runs', title: 'Runs', key: 'u', load: () => import('./runs/view') },
   { name: 'station', title: 'Station', key: 's', load: () => import('./station') },
 ];
 
