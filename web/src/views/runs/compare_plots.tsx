@@ -206,12 +206,12 @@ export function ComparePlots({ aligned, comparison, is_loading }: Props) {
         <span class="window" id="plot-window" role="status">
           {since_text(view[0], 1)} to {since_text(view[1], 1)} around the moment
         </span>
+        <output class="cursor-time">{cursor_time}</output>
         <span class="quiet">
           {is_loading ? 'being read' : `a value each ${since_text(aligned.grid_s)}`}
           {aligned.runs.some((run) => run.uncertain_s > 0.015) &&
             `; aligned within ${since_text(Math.max(...aligned.runs.map((run) => run.uncertain_s)))}`}
         </span>
-        <output class="cursor-time">{cursor_time}</output>
       </div>
       <div class="run-strips">
         {kShown.map((shown, at) => (

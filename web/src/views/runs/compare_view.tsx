@@ -78,7 +78,7 @@ export function CompareView({ session, api, route }: Props) {
 
   return (
     <>
-      <header class="view-head run-head">
+      <section class="view-head run-head" aria-label="Comparison">
         <p class="way-back">
           <a href={format({ view: 'runs', query: { chosen: runs_key } })}>Runs</a>
         </p>
@@ -90,7 +90,7 @@ export function CompareView({ session, api, route }: Props) {
         ) : (
           <AlignTools comparison={comparison} />
         )}
-      </header>
+      </section>
       <main class="view-body run-view" aria-label="Comparison of runs">
         {problem.value && (
           <p class="problem" role="alert" id="align-problem">

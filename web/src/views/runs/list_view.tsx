@@ -43,10 +43,10 @@ export function RunList({ session, api, route }: { session: Session; api: RunsAp
   const runs = search.found.value;
   return (
     <>
-      <header class="view-head runs-head">
+      <section class="view-head runs-head" aria-label="Search runs">
         <h1>Runs</h1>
         <Filters session={session} route={route} problem={problem} />
-      </header>
+      </section>
       <main class="view-body runs-view" aria-label="Runs">
         <Chosen chosen={chosen} />
         {search.problem.value && (
@@ -265,7 +265,7 @@ function Row({ run, is_chosen, is_current, on_choose }: RowProps) {
       <td class="number length">{is_open ? '' : length_text(run)}</td>
       <td class={`is-record ${tone}`}>
         {run.state !== 'ended' && <span class={`state ${run.state}`}>{state}</span>}
-        {!(is_open && text === 'recording') && text}
+        {!is_open && <span class={tone === '' ? 'complete' : ''}>{text}</span>}
       </td>
       <td class="verdict">{run.verdict}</td>
     </tr>

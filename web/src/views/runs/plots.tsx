@@ -33,7 +33,9 @@ export function RunPlots({ page, route }: { page: RunPage; route: Route }) {
     const [from_us, to_us] = [from_s, to_s].map((time_s) => page.origin_us + time_s * 1e6) as [number, number];
     show(inside({ from_us, to_us }, bounds));
   };
+  const cursor_s = useRef<number | null>(null);
   const write_cursor = (at_s: number | null) => {
+    cursor_s.current = at_s;
     const traces = page.traces.peek();
     kStrips.forEach(
       (strip, at) => ((cursors[at] as Signal<string>).value = traces ? cursor_text(strip, traces, at_s) : ''),
@@ -87,6 +89,7 @@ export function RunPlots({ page, route }: { page: RunPage; route: Route }) {
       const lines = lines_of(moments, page.origin_us, picked_s, at === 0);
       plot.show(content_of(strip, traces, lines), view, range_of(traces, columns, ...view), options_of(at));
     });
+    write_cursor(cursor_s.current); // of the values that are drawn now
   }, [traces, moments, picked_s, is_clock, view[0], view[1]]);
   useEffect(() => {
     const width_px = hosts.current[0]?.clientWidth ?? 1000;
@@ -173,17 +176,17 @@ function Toolbar({ page, shown, is_whole, is_clock, cursor_time, on_show, on_tim
       <span class="window" id="plot-window" role="status">
         {text}
       </span>
+      <output class="cursor-time">{cursor_time}</output>
       <span class="quiet" id="plot-source">
         {page.is_loading.value
           ? 'finer values are on their way'
           : samples > 1
-            ? `least and largest of ${count(samples)} samples per point`
+            ? `up to ${count(samples)} samples a point: least and largest`
             : samples === 1
               ? 'every sample'
               : ''}
       </span>
-      <output class="cursor-time">{cursor_time}</output>
-      <span class="steps" role="group" aria-label="Times">
+      <span class="steps times" role="group" aria-label="Times">
         <button type="button" id="time-since" aria-pressed={!is_clock} onClick={() => on_time('')}>
           Since start
         </button>

@@ -69,7 +69,7 @@ function OneRun({ session, page, api, route }: Props & { page: RunPage }) {
   const bounds = page.bounds;
   return (
     <>
-      <header class="view-head run-head">
+      <section class="view-head run-head" aria-label="Run">
         <p class="way-back">
           <a href={format({ view: 'runs' })}>Runs</a>
         </p>
@@ -81,7 +81,7 @@ function OneRun({ session, page, api, route }: Props & { page: RunPage }) {
           {run.fluid && ` · ${fluid_text(run.fluid)}`}
           {run.verdict && ` · ${run.verdict}`}
         </p>
-      </header>
+      </section>
       <main class="view-body run-view" aria-label={`Run ${run.run_id}`}>
         {run.state === 'discarded' ? (
           <p class="quiet">This run was discarded: its samples are no longer held, and there is nothing to draw.</p>
