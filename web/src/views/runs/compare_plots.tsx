@@ -219,6 +219,7 @@ export function ComparePlots({ aligned, comparison, is_loading }: Props) {
             <figcaption>
               <b>{shown.title}</b> <span class="unit">{shown.unit}</span>
               {shown.is_difference && reference && <span class="quiet"> from #{reference.run_id}</span>}
+              {at === 0 && <RunKey runs={aligned.runs} />}
               {at < 2 && aligned.runs.length <= kMostBands && <span class="quiet"> ± 2 sd</span>}
               <output class="cursor">{cursors[at]}</output>
             </figcaption>
@@ -229,3 +230,13 @@ export function ComparePlots({ aligned, comparison, is_loading }: Props) {
     </section>
   );
 }
+
+const RunKey = ({ runs }: { runs: AlignedRun[] }) => (
+  <span class="key">
+    {runs.map(({ run_id }, at) => (
+      <span class="of-run" key={run_id}>
+        <i class={`run-swatch run-${at % 12}`} /> #{run_id}
+      </span>
+    ))}
+  </span>
+);

@@ -67,10 +67,7 @@ export class RunPage {
       take(this.api.certificate(this.run_id), (certificate) => (this.certificate.value = certificate)),
       take(this.api.markers(this.run_id), (markers) => (this.markers.value = markers)),
       take(this.api.events(robot_id), (events) => (this.events.value = events)),
-      this.api.metrics(this.run_id).then(
-        (metrics) => ((this.metrics.value = metrics), (this.metrics_problem.value = '')),
-        (error: unknown) => (this.metrics_problem.value = said(error)),
-      ),
+      this.load_metrics(),
       this.load_whole(),
     ]);
     await this.load_knots();
@@ -87,6 +84,17 @@ export class RunPage {
   stop(): void {
     this.turn += 1;
     this.cancel.abort();
+  }
+
+  // Those of an open run are computed anew for each request, so they are asked for once, and again when it has ended.
+  private async load_metrics(): Promise<void> {
+    if (this.run.peek()?.state === 'open' && this.metrics.peek()) return;
+    try {
+      this.metrics.value = await this.api.metrics(this.run_id);
+      this.metrics_problem.value = '';
+    } catch (error) {
+      this.metrics_problem.value = said(error);
+    }
   }
 
   private async load_whole(): Promise<void> {
