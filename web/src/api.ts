@@ -66,6 +66,7 @@ export class ApiError extends Error {
 export type Fetch = (path: string, options: RequestInit) => Promise<Response>;
 
 const kPatience_ms = 6000;
+const kLongPatience_ms = 30_000; // for what is computed from many samples
 
 export class Api {
   // `stamp_us`: the latest of the live link, null while it is down; a command is worth as little as what its operator saw
@@ -145,6 +146,11 @@ export class Api {
   revoke_robot = (robot_id: string) =>
     this.ask<Enrolment>('POST', `/enrolments/${encodeURIComponent(robot_id)}/revoke`);
 
+  // For a view that has functions of its own for its routes. A request whose signal is aborted is cancelled by the station.
+  read = <Answer>(path: string, signal?: AbortSignal, patience_ms = kLongPatience_ms) =>
+    this.ask<Answer>('GET', path, undefined, undefined, { signal, patience_ms });
+  change = <Answer>(path: string, body: object) => this.ask<Answer>('POST', path, body);
+
   // True when the station answers that this page may not speak to it.
   async is_signed_out(): Promise<boolean> {
     return (await this.fetch('/api/v1/station', { method: 'GET' })).status === 401;
@@ -163,9 +169,17 @@ export class Api {
     return this.ask<CommandRecord>('POST', `/robots/${encodeURIComponent(robot_id)}/commands`, { ...body, stamp_us });
   }
 
-  private async ask<Answer>(method: string, path: string, body?: object, key?: string): Promise<Answer> {
+  private async ask<Answer>(
+    method: string,
+    path: string,
+    body?: object,
+    key?: string,
+    end: { signal?: AbortSignal | undefined; patience_ms?: number } = {},
+  ): Promise<Answer> {
     const headers: Record<string, string> = {};
-    const options: RequestInit = { method, headers, signal: AbortSignal.timeout(kPatience_ms) };
+    const timeout = AbortSignal.timeout(end.patience_ms ?? kPatience_ms);
+    const signal = end.signal ? AbortSignal.any([end.signal, timeout]) : timeout;
+    const options: RequestInit = { method, headers, signal };
     if (key) headers['Idempotency-Key'] = key;
     if (body) {
       headers['Content-Type'] = 'application/json';

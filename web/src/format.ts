@@ -80,6 +80,13 @@ export function clock_time(utc_ms: number): string {
   return `${two(date.getHours())}:${two(date.getMinutes())}:${two(date.getSeconds())}.${ms}`;
 }
 
+// Local date and time of day to the minute: "2026-11-26 14:05".
+export function date_and_time(utc_ms: number): string {
+  const date = new Date(utc_ms);
+  const two = (value: number) => String(value).padStart(2, '0');
+  return `${date.getFullYear()}-${two(date.getMonth() + 1)}-${two(date.getDate())} ${two(date.getHours())}:${two(date.getMinutes())}`;
+}
+
 // An identifier of the protocol as words: "sensor_out_of_range" becomes "sensor out of range".
 export const fluid_text = (fluid: string) => (fluid === 'non_newtonian' ? 'non-Newtonian' : words(fluid));
 export const words = (identifier: string) => identifier.replaceAll('_', ' ');

@@ -11,7 +11,7 @@ export interface Outcome {
 export interface Asking {
   outcome: Signal<Outcome>;
   pending: boolean;
-  ask(what: string, request: () => Promise<unknown>): Promise<boolean>;
+  ask(what: string, request: () => Promise<unknown>, whom?: string): Promise<boolean>; // whom: it waits for
   fail(text: string): void;
   clear(): void;
 }
@@ -24,13 +24,13 @@ export function useAsking(): Asking {
     pending: outcome.value.phase === 'pending',
     fail: (text) => (outcome.value = { phase: 'failed', text }),
     clear: () => outcome.value.phase !== 'pending' && (outcome.value = { phase: 'idle', text: '' }),
-    async ask(what, request) {
+    async ask(what, request, whom = 'the robot') {
       const number = ++latest.current;
       const started_ms = performance.now();
       const show = (phase: Outcome['phase'], text: string) => {
         if (number === latest.current) outcome.value = { phase, text };
       };
-      show('pending', `${what}: waiting for the robot`);
+      show('pending', `${what}: waiting for ${whom}`);
       try {
         await request();
         show('done', `${what}: accepted in ${Math.round(performance.now() - started_ms)} ms`);

@@ -1,0 +1,34 @@
+// What a view owes to everybody who opens it: no violation of WCAG AA that axe-core finds, no horizontal scrolling.
+import assert from 'node:assert/strict';
+import { readFileSync } from 'node:fs';
+import { createRequire } from 'node:module';
+
+const axe_path = createRequire(new URL('../../web/package.json', import.meta.url)).resolve('axe-core/axe.min.js');
+const axe_source = readFileSync(axe_path, 'utf8');
+const kSizes = [[1440, 900], [1024, 768], [768, 1024], [390, 844], [844, 390]];
+const kRules = ['wcag2a', 'wcag2aa', 'wcag21a', 'wcag21aa', 'wcag22aa', 'best-practice'];
+
+// At each size, and in both themes at the widest one. The page keeps the last size.
+export async function assert_accessible(page, what, sizes = kSizes) {
+  for (const [width, height] of sizes) {
+    await page.setViewportSize({ width, height });
+    await page.waitForTimeout(300); // plots follow
+    for (const colorScheme of width === 1440 ? ['light', 'dark'] : ['dark']) {
+      await page.emulateMedia({ colorScheme });
+      const at = `${what} at ${width}x${height}, ${colorScheme}`;
+      const scroll_width = await page.evaluate(() => document.documentElement.scrollWidth);
+      assert.ok(scroll_width <= width, `${at}: ${scroll_width} pixels wide`);
+      assert.deepEqual(await violations(page), [], at);
+    }
+  }
+}
+
+// The content security policy of the page forbids scripts from elsewhere; axe-core is evaluated by the browser's own hand.
+async function violations(page) {
+  await page.evaluate(axe_source);
+  const found = await page.evaluate(async (values) => {
+    const { violations: list } = await globalThis.axe.run(document, { runOnly: { type: 'tag', values } });
+    return list.map(({ id, help, nodes }) => ({ id, help, nodes: nodes.slice(0, 5).map(({ html, failureSummary }) => `${html.slice(0, 160)} ${failureSummary}`) }));
+  }, kRules);
+  return found;
+}

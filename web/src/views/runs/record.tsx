@@ -1,0 +1,286 @@
+// Beside the plots of a run: how complete its record is, its digest, its conditions, what is said of it, and its files.
+
+import { useSignal } from '@preact/signals';
+import type { ComponentChildren } from 'preact';
+import { count, date_and_time, duration, fluid_text } from '../../format';
+import { OutcomeLine, useAsking } from '../../parts/request';
+import type { Session } from '../../session';
+import type { RunPage } from './run_page';
+import type { Annotation, Certificate, Run, RunsApi } from './runs_api';
+import { since_text } from './time_axis';
+
+const kStation = 'the station';
+
+interface RecordProps {
+  session: Session;
+  api: RunsApi;
+  page: RunPage;
+}
+
+export function Record({ session, api, page }: RecordProps) {
+  const run = page.run.value;
+  if (!run) return null;
+  const may_write = session.me.value?.scopes.split(',').includes('record') ?? false;
+  return (
+    <div class="record">
+      <Completeness run={run} certificate={page.certificate.value} />
+      {may_write ? (
+        <>
+          <Said key={`said-${run.run_id}`} api={api} page={page} run={run} />
+          <NewMarker api={api} page={page} run={run} />
+        </>
+      ) : (
+        <SaidOnly run={run} />
+      )}
+      <Conditions run={run} />
+      <Files run={run} may_export={may_write} />
+    </div>
+  );
+}
+
+// What the record has of the samples that the robot made, in a sentence.
+export function completeness_text(run: Run, certificate: Certificate | null): { tone: string; text: string } {
+  if (run.state === 'discarded') return { tone: 'caution', text: 'Discarded: its samples are no longer held.' };
+  if (run.state === 'open') return { tone: '', text: `Recording: ${count(run.samples_stored)} samples so far.` };
+  if (!certificate) return { tone: '', text: 'How complete it is, is being counted.' };
+  const { samples_expected, samples_lost, samples_missing, lost_by_cause, longest_gap_samples } = certificate;
+  if (samples_lost === 0 && samples_missing === 0) {
+    return { tone: 'good', text: `Recorded, nothing lost: all ${count(samples_expected)} samples.` };
+  }
+  const causes = Object.entries(lost_by_cause).map(([cause, lost]) => `${count(lost)} ${cause.replaceAll('_', ' ')}`);
+  const parts = [
+    samples_lost > 0 && `${count(samples_lost)} of ${count(samples_expected)} samples are lost (${causes.join(', ')})`,
+    samples_missing > 0 && `${count(samples_missing)} are still missing: the robot may send them yet`,
+    longest_gap_samples > 0 && `the longest gap has ${count(longest_gap_samples)}`,
+  ].filter(Boolean);
+  return { tone: 'caution', text: `${parts.join('; ')}.` };
+}
+
+function Completeness({ run, certificate }: { run: Run; certificate: Certificate | null }) {
+  const { tone, text } = completeness_text(run, certificate);
+  return (
+    <section aria-label="Record" id="completeness">
+      <p class={`completeness ${tone}`}>{text}</p>
+      {certificate && (
+        <p class="quiet">
+          {certificate.samples_backfilled > 0 && `${count(certificate.samples_backfilled)} were sent again. `}
+          {certificate.worst_clock_uncertainty_us >= 0
+            ? `Its clock is exact within ${(certificate.worst_clock_uncertainty_us / 1000).toFixed(1)} ms.`
+            : 'No sample has an estimate of its UTC.'}
+        </p>
+      )}
+      {certificate?.sha256 && (
+        <p class="digest">
+          <span class="quiet">SHA-256</span> <code id="digest">{certificate.sha256.match(/.{8}/g)?.join(' ')}</code>
+        </p>
+      )}
+      {certificate && !certificate.final && <p class="quiet">The digest is made when no sample is missing any more.</p>}
+    </section>
+  );
+}
+
+function Said({ api, page, run }: { api: RunsApi; page: RunPage; run: Run }) {
+  const asking = useAsking();
+  const name = useSignal<string | null>(null); // null: as it is
+  const notes = useSignal<string | null>(null);
+  const verdict = useSignal<string | null>(null);
+  const change: Annotation = {};
+  if (name.value !== null && name.value.trim() !== run.name) change.name = name.value.trim();
+  if (notes.value !== null && notes.value !== run.notes) change.notes = notes.value;
+  if (verdict.value !== null && verdict.value !== run.verdict) change.verdict = verdict.value;
+  const is_changed = Object.keys(change).length > 0;
+  const save = async () => {
+    if (change.name === '') return asking.fail('A run has a name: write one of at least one letter.');
+    const saved = await asking.ask(
+      'Change',
+      async () => (page.run.value = await api.annotate(run.run_id, change)),
+      kStation,
+    );
+    if (saved) name.value = notes.value = verdict.value = null;
+  };
+  return (
+    <form
+      class="said"
+      aria-label="What is said of the run"
+      onSubmit={(event) => {
+        event.preventDefault();
+        void save();
+      }}
+    >
+      <label for="said-name">Name</label>
+      <input
+        id="said-name"
+        autoComplete="off"
+        maxLength={200}
+        value={name.value ?? run.name}
+        onInput={(event) => (name.value = event.currentTarget.value)}
+      />
+      <label for="said-verdict">Verdict</label>
+      <input
+        id="said-verdict"
+        autoComplete="off"
+        maxLength={4000}
+        placeholder="none yet"
+        value={verdict.value ?? run.verdict}
+        onInput={(event) => (verdict.value = event.currentTarget.value)}
+      />
+      <label for="said-notes">Notes</label>
+      <textarea
+        id="said-notes"
+        rows={3}
+        maxLength={4000}
+        placeholder="none yet"
+        value={notes.value ?? run.notes}
+        onInput={(event) => (notes.value = event.currentTarget.value)}
+      />
+      <button type="submit" id="save-said" disabled={!is_changed || asking.pending}>
+        Save
+      </button>
+      <OutcomeLine asking={asking} id="said-outcome" />
+    </form>
+  );
+}
+
+function NewMarker({ api, page, run }: { api: RunsApi; page: RunPage; run: Run }) {
+  const asking = useAsking();
+  const text = useSignal('');
+  const at_s = page.picked_s.value;
+  if (at_s === null) return <p class="quiet">Click on a plot to put a marker there.</p>;
+  const add = async () => {
+    if (text.value.trim() === '') return asking.fail('Write what happened there.');
+    const at_us = page.origin_us + at_s * 1e6;
+    const added = await asking.ask(
+      'Marker',
+      async () => {
+        await api.add_marker(run.robot_id, text.value.trim(), at_us);
+        page.markers.value = await api.markers(run.run_id);
+      },
+      kStation,
+    );
+    if (!added) return;
+    text.value = '';
+    page.picked_s.value = null;
+  };
+  return (
+    <form
+      class="said"
+      aria-label="New marker"
+      onSubmit={(event) => {
+        event.preventDefault();
+        void add();
+      }}
+    >
+      <label for="marker-text">Marker at {since_text(at_s)}</label>
+      <input
+        id="marker-text"
+        autoComplete="off"
+        maxLength={4000}
+        placeholder="What happened"
+        value={text.value}
+        onInput={(event) => (text.value = event.currentTarget.value)}
+      />
+      <span class="pair-of-buttons">
+        <button type="submit" id="add-marker" disabled={asking.pending}>
+          Add marker
+        </button>
+        <button type="button" onClick={() => (page.picked_s.value = null)}>
+          Not here
+        </button>
+      </span>
+      <OutcomeLine asking={asking} id="marker-outcome" />
+    </form>
+  );
+}
+
+const SaidOnly = ({ run }: { run: Run }) => (
+  <section aria-label="What is said of the run">
+    <Facts
+      facts={[
+        ['Verdict', run.verdict],
+        ['Notes', run.notes],
+      ]}
+    />
+  </section>
+);
+
+function Conditions({ run }: { run: Run }) {
+  const ended = run.ended_at_us === null ? 'open' : date_and_time(run.ended_at_us / 1000);
+  return (
+    <section aria-label="Conditions" id="conditions">
+      <h2>Conditions</h2>
+      <Facts
+        facts={[
+          ['Robot', <a href={`#/robot/${encodeURIComponent(run.robot_id)}`}>{run.robot_id}</a>],
+          ['Began', date_and_time(run.started_at_us / 1000)],
+          ['Ended', run.state === 'interrupted' ? `${ended}, the station stopped` : ended],
+          ['Fluid', run.fluid && fluid_text(run.fluid)],
+          ['Pump', run.pump_profile],
+          ['Mean flow', run.mean_flow_m_s !== null && `${(run.mean_flow_m_s * 1000).toFixed(1)} mm/s`],
+          ['Tube', run.tube],
+          ['Operator', run.operator_name],
+          ['Profile', run.profile],
+          ['Begun by', run.made_by + (run.made_afterwards ? ', afterwards' : '')],
+          ['Firmware', run.firmware_version],
+          ['Controller', `${run.controller_id} (${run.controller_checksum.toString(16).padStart(8, '0')})`],
+          ['Parameters', run.parameters_checksum.toString(16).padStart(8, '0')],
+          ['Boots', run.spans.length > 1 && `${run.spans.length}: the robot restarted in it`],
+        ]}
+      />
+    </section>
+  );
+}
+
+// What is empty is left out.
+function Facts({ facts }: { facts: [string, ComponentChildren | false][] }) {
+  const known = facts.filter(([, value]) => value !== false && value !== '' && value !== null);
+  if (known.length === 0) return <p class="quiet">Nothing was noted.</p>;
+  return (
+    <dl class="facts">
+      {known.map(([name, value]) => (
+        <div key={name}>
+          <dt>{name}</dt>
+          <dd>{value}</dd>
+        </div>
+      ))}
+    </dl>
+  );
+}
+
+const kFiles: readonly { name: string; text: string; what: string; exports: boolean }[] = [
+  { name: 'report.html', text: 'Report', what: 'one HTML file that prints well', exports: false },
+  { name: 'samples.csv', text: 'CSV', what: 'a line per sample', exports: true },
+  { name: 'samples.mat', text: 'MAT', what: 'for MATLAB and Octave', exports: true },
+  { name: 'samples.sqlite', text: 'SQLite', what: 'with events, commands, markers', exports: true },
+  { name: 'capsule.eln', text: 'Archive .eln', what: 'all of it, to check and compute again', exports: true },
+];
+
+function Files({ run, may_export }: { run: Run; may_export: boolean }) {
+  const is_held = run.state !== 'discarded';
+  const has_ended = run.state !== 'open';
+  const offered = kFiles.filter(
+    ({ name, exports }) => (may_export || !exports) && (has_ended || name !== 'capsule.eln'),
+  );
+  return (
+    <section aria-label="Files" id="files">
+      <h2>Files</h2>
+      {is_held ? (
+        <ul class="files">
+          {offered.map(({ name, text, what }) => (
+            <li key={name}>
+              <a href={`/api/v1/runs/${run.run_id}/${name}`} download="">
+                {text}
+              </a>
+              <span class="quiet">{what}</span>
+            </li>
+          ))}
+        </ul>
+      ) : (
+        <p class="quiet">A discarded run has no files.</p>
+      )}
+      {!may_export && <p class="quiet">Exports of samples need the role operator.</p>}
+    </section>
+  );
+}
+
+export const length_text = (run: Run) =>
+  run.ended_at_us === null ? 'open' : duration((run.ended_at_us - run.started_at_us) / 1000);

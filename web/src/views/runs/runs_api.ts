@@ -1,0 +1,80 @@
+// What the view of runs asks of the station, with the types of the API.
+
+import type { Api, EventRecord } from '../../api';
+import type { components } from '../../api_types';
+
+type Schemas = components['schemas'];
+export type Run = Schemas['Run'];
+export type RunState = Schemas['RunState'];
+export type Certificate = Schemas['Certificate'];
+export type Marker = Schemas['Marker'];
+export type Overview = Schemas['Overview'];
+export type RunMetrics = Schemas['RunMetrics'];
+export type Step = Schemas['Step'];
+export type StoredSample = Schemas['StoredSample'];
+export type RunComparison = Schemas['RunComparison'];
+export type ComparedValue = Schemas['ComparedValue'];
+export type AlignedRuns = Schemas['AlignedRuns'];
+export type AlignedRun = Schemas['AlignedRun'];
+export type ImpedanceMap = Schemas['ImpedanceMap'];
+export type ImpedanceBins = Schemas['ImpedanceBins'];
+export type Annotation = Schemas['RunAnnotationBody'];
+
+export interface AskedRuns {
+  robot_id: string;
+  state: string;
+  before: number | null; // only runs with a smaller number
+  limit: number;
+}
+
+export interface Window {
+  from_us: number;
+  to_us: number;
+}
+
+export const kMostComparedTraces = 12;
+
+// A query of what is not empty.
+export function query(members: Record<string, string | number | null | undefined>): string {
+  const said = Object.entries(members).filter(([, value]) => value !== null && value !== undefined && value !== '');
+  return new URLSearchParams(said.map(([name, value]) => [name, String(value)])).toString();
+}
+
+export class RunsApi {
+  constructor(private readonly api: Pick<Api, 'read' | 'change'>) {}
+
+  page = async ({ robot_id, state, before, limit }: AskedRuns, signal?: AbortSignal): Promise<Run[]> =>
+    (await this.api.read<{ runs: Run[] }>(`/runs?${query({ robot_id, state, before, limit })}`, signal)).runs;
+  run = (run_id: number) => this.api.read<Run>(`/runs/${run_id}`);
+  certificate = (run_id: number) => this.api.read<Certificate>(`/runs/${run_id}/certificate`);
+  metrics = (run_id: number) => this.api.read<RunMetrics>(`/runs/${run_id}/metrics`);
+  markers = async (run_id: number) => (await this.api.read<{ markers: Marker[] }>(`/runs/${run_id}/markers`)).markers;
+  // The newest of the robot; those of an old run may be out of reach.
+  events = async (robot_id: string) =>
+    (await this.api.read<{ events: EventRecord[] }>(`/robots/${encodeURIComponent(robot_id)}/events?limit=1000`))
+      .events;
+  overview = (run_id: number, window: Window | null, points: number, signal?: AbortSignal) =>
+    this.api.read<Overview>(`/runs/${run_id}/overview?${query({ ...window, points })}`, signal);
+  // The first sample of the robot at or after a moment; null where there is none.
+  sample_at = async (robot_id: string, from_us: number, signal?: AbortSignal): Promise<StoredSample | null> => {
+    const path = `/robots/${encodeURIComponent(robot_id)}/samples?${query({ from_us, limit: 1 })}`;
+    return (await this.api.read<{ samples: StoredSample[] }>(path, signal)).samples[0] ?? null;
+  };
+  // The sample after a place "span-seq" of the run.
+  first_after = async (run_id: number, after: string): Promise<StoredSample | null> =>
+    (await this.api.read<{ samples: StoredSample[] }>(`/runs/${run_id}/samples?${query({ after, limit: 1 })}`))
+      .samples[0] ?? null;
+  // Of one run, or of several together.
+  impedance = async (runs: number[], bin_mm: number): Promise<ImpedanceMap> => {
+    if (runs.length === 1) return this.api.read<ImpedanceMap>(`/runs/${runs[0]}/impedance-map?${query({ bin_mm })}`);
+    const path = `/run-comparison/impedance-map?${query({ runs: runs.join(','), bin_mm })}`;
+    return (await this.api.read<{ together: ImpedanceMap }>(path)).together;
+  };
+  annotate = (run_id: number, said: Annotation) => this.api.change<Run>(`/runs/${run_id}/annotate`, said);
+  add_marker = (robot_id: string, text: string, at_us: number) =>
+    this.api.change<Marker>(`/robots/${encodeURIComponent(robot_id)}/markers`, { text, at_us: Math.round(at_us) });
+
+  comparison = (runs: number[]) => this.api.read<RunComparison>(`/run-comparison?${query({ runs: runs.join(',') })}`);
+  aligned = (said: Record<string, string | number | null>, signal?: AbortSignal) =>
+    this.api.read<AlignedRuns>(`/run-comparison/traces?${query(said)}`, signal);
+}
