@@ -155,7 +155,7 @@ export class Api {
     return this.ask<CommandRecord>('POST', `/robots/${encodeURIComponent(robot_id)}/commands`, { ...body, stamp_us });
   }
 
-  private async ask<Answer>(method: string, path: string, body?: object, key?: string): Promise<Answer> {
+  async ask<Answer>(method: string, path: string, body?: object, key?: string): Promise<Answer> {
     const headers: Record<string, string> = {};
     const options: RequestInit = { method, headers, signal: AbortSignal.timeout(kPatience_ms) };
     if (key) headers['Idempotency-Key'] = key;

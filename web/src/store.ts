@@ -4,6 +4,7 @@
 
 import { batch, computed, signal } from '@preact/signals';
 import type { CommandRecord, EventRecord, LiveMessage, RobotState, RunRecord } from './api';
+import { ExperimentsStore } from './experiments_store';
 import { Robot } from './robot';
 import type { StopEvidence } from './stop_outcome';
 
@@ -34,6 +35,7 @@ export class Store {
   readonly runs = signal<RunRecord[]>([]); // that are open, at most one for each robot
   readonly interrupted = signal<RunRecord[]>([]); // of each robot its newest run, if the station stopped in it
   readonly now_ms = signal(0); // page time, for ages
+  readonly experiments = new ExperimentsStore();
   private readonly by_id = new Map<string, Robot>();
   private pending_log: LogLine[] = [];
   private notes = 0;
@@ -76,7 +78,9 @@ export class Store {
       case 'problem':
         this.note(`The station refused a message of this page: ${message.problem.detail}`);
         break;
-      case 'experiment': // shown by what it does to the robot
+      case 'experiment':
+        this.experiments.take(message.experiment);
+        break;
       case 'stamp':
         break;
     }
