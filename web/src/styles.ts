@@ -10,5 +10,8 @@ import './style/panels.css';
 import './style/readouts.css';
 import './style/charts.css';
 import './style/controls.css';
+import './style/experiments.css';
+import './style/experiments_one.css';
+import './style/experiments_queue.css';
 import './style/stop.css';
 import './style/small_screens.css';

@@ -27,6 +27,7 @@ export interface View {
 
 export const kViews: readonly View[] = [
   { name: 'robot', title: 'Robot', key: 'r', load: () => import('./robot') },
+  { name: 'experiments', title: 'Experiments', key: 'e', load: () => import('./experiments') },
   { name: 'station', title: 'Station', key: 's', load: () => import('./station') },
 ];
 
