@@ -19,7 +19,7 @@ export default function ExperimentsView(props: ViewProps) {
   const part = props.route.parts[0];
   return (
     <>
-      <header class="view-head">
+      <section class="view-head" aria-label="Parts of Experiments">
         <h1>Experiments</h1>
         <nav class="tabs" aria-label="Experiments">
           {kTabs.map((tab) => (
@@ -33,7 +33,7 @@ export default function ExperimentsView(props: ViewProps) {
             </a>
           ))}
         </nav>
-      </header>
+      </section>
       <main class="view-body experiments-view" aria-label="Experiments">
         <Part {...props} />
       </main>

@@ -206,7 +206,7 @@ function RunPlot({ session, experiment, summary }: RunPlotProps) {
         at_s={elapsed_s}
         label={`Run ${number}: predicted from ${millimetres(answer.position_min_m ?? null, 0)} to ${millimetres(answer.position_max_m ?? null, 0)} mm`}
       />
-      <p class="legend">
+      <p class="track-legend">
         {measured && <span class="key measured">position, estimated</span>}{' '}
         <span class="key predicted">predicted{has_band ? ' ± 2 sd' : ''}</span>{' '}
         <span class="key setpoint">setpoint</span> <span class="key duty">duty, predicted</span>

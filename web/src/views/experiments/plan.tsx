@@ -49,7 +49,7 @@ export function Plan({ plan, fluid, fluids, controller, is_typed }: PlanProps) {
         label={`Predicted response of run ${at + 1}: from ${low} to ${high} mm in ${how_long(run.duration_s)}`}
         step_begins_s={run.line.step_begins.map((tick) => tick * kTick_s)}
       />
-      <p class="legend">
+      <p class="track-legend">
         <span class="key predicted">predicted position</span> <span class="key setpoint">setpoint</span>{' '}
         <span class="key duty">duty</span>
         <span class="quiet">

@@ -102,8 +102,12 @@ export function situation(experiment: ExperimentSummary): { what: string; todo: 
   return { what: end_text(reason), todo: '' };
 }
 
-export const sentence_of = (text: string) =>
-  text === '' ? '' : `${text[0]!.toUpperCase()}${text.slice(1)}${/[.!?]$/.test(text) ? '' : '.'}`;
+// The station's words as a sentence; one that begins with an actor ("token:ci has …") keeps its first letter.
+export function sentence_of(text: string): string {
+  if (text === '') return '';
+  const first = /^\S*:/.test(text) ? text[0] : text[0]!.toUpperCase();
+  return `${first}${text.slice(1)}${/[.!?]$/.test(text) ? '' : '.'}`;
+}
 
 // "run 2 of 6, step 1 of 2": the word for the screen; the seconds stand beside it.
 export function progress_text({ progress }: Pick<ExperimentSummary, 'progress'>): string {
