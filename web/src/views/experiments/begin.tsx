@@ -232,16 +232,19 @@ function useSurroundings(session: ViewProps['session'], robot: Robot | null) {
   const { experiments } = session;
   const id = robot?.robot_id ?? '';
   const state = robot?.state.value;
-  const of_robot = <Answer,>(ask: (robot_id: string) => Promise<Answer | null>) =>
-    id === '' ? Promise.resolve(null) : ask(id);
+  // What was asked of another robot is not taken for this one's.
+  const of_robot = async <Answer,>(ask: (robot_id: string) => Promise<Answer | null>) => ({
+    id,
+    answer: id === '' ? null : await ask(id),
+  });
   const controller = useAsked(session, () => of_robot(experiments.controller), [id, state?.controller_checksum]);
   const fluids = useAsked(session, experiments.fluids, []);
   const newest_run = useAsked(session, () => of_robot(experiments.newest_run), [id], kLook_ms);
   const reservations = useAsked(session, experiments.reservations, [], kLook_ms);
   return {
-    controller: controller.answer,
+    controller: controller.answer?.id === id ? controller.answer.answer : null,
     fluids: fluids.answer,
-    newest_run: newest_run.answer,
+    newest_run: newest_run.answer?.id === id ? newest_run.answer.answer : null,
     reservations: reservations.answer ?? [],
   };
 }

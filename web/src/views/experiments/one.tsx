@@ -33,11 +33,11 @@ export function OneExperiment({ session, id }: { session: Session; id: number })
   }, [id, change]);
   const whole = asked.answer?.experiment_id === id ? asked.answer : null;
   const summary = known ?? whole;
-  // SAFETY: Escape is for the robot that is looked at. An experiment that the page knows selects it in the call in which
-  // it is opened; one that has to be asked for does not move the name on the stop button: see StopNote.
+  // SAFETY: Escape is for the robot that is looked at. An experiment that goes on, and that the page knows, selects it in the
+  // call in which it is opened; one that has to be asked for does not move the name on the stop button: see StopNote.
   useLayoutEffect(() => {
-    const robot_id = store.experiments.find(id)?.robot_id;
-    if (robot_id !== undefined && store.find(robot_id)) store.select(robot_id);
+    const opened = store.experiments.find(id);
+    if (opened && !has_ended(opened) && store.find(opened.robot_id)) store.select(opened.robot_id);
   }, [id]);
 
   if (!summary) {

@@ -88,7 +88,9 @@ function RobotQueue({ session, robot_id, acts }: { session: Session; robot_id: s
       <h3>{robot_id}</h3>
       {at_work && (
         <a class="at-work" href={link_to(at_work.experiment_id)}>
-          <span class={`state lamp-like ${at_work.state}`}>{kStates[at_work.state]}</span>
+          <span class={`state lamp-like ${is_current ? at_work.state : 'stale'}`}>
+            {is_current ? kStates[at_work.state] : `Was: ${kStates[at_work.state]}`}
+          </span>
           <b>{at_work.name}</b>
           {at_work.progress && (
             <progress max={at_work.progress.duration_s} value={at_work.progress.elapsed_s} aria-label="Of this run" />

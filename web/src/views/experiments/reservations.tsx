@@ -31,6 +31,11 @@ export function Reservations({ session }: ViewProps) {
           {asked.problem}
         </p>
       )}
+      {!store.is_current.value && (
+        <p class="problem" role="status">
+          Cut off from the station: this is what was known last.
+        </p>
+      )}
       {commands ? (
         <ReserveForm session={session} is_admin={is_admin} on_made={asked.ask_again} />
       ) : (
