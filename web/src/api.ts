@@ -169,7 +169,7 @@ export class Api {
     return this.ask<CommandRecord>('POST', `/robots/${encodeURIComponent(robot_id)}/commands`, { ...body, stamp_us });
   }
 
-  private async ask<Answer>(
+  async ask<Answer>(
     method: string,
     path: string,
     body?: object,

@@ -16,6 +16,7 @@ import { alarms_of } from './alarms';
 import { Alerts, browser_alerts } from './alerts';
 import { DutyHold } from './duty_hold';
 import { EmergencyStop, kIdleStop } from './emergency';
+import { ExperimentsApi } from './experiments_api';
 import { go_to, route } from './route';
 import { kCurrent_ms, LiveLink, type LinkPhase, type Surroundings } from './live';
 import { StationPath } from './station_path';
@@ -35,6 +36,7 @@ export class Session {
     (path, options) => this.ask(path, options),
     () => this.link.stamp_us,
   );
+  readonly experiments = new ExperimentsApi((method, path, body) => this.api.ask(method, path, body));
   readonly store = new Store({ page_ms: () => performance.now(), utc_ms: () => Date.now() });
   readonly settings = new ViewSettings(browser_shelf());
   readonly station = signal<Station | null>(null);
@@ -76,6 +78,9 @@ export class Session {
         if (message.type === 'problem') this.hold.lapse(); // the only message that it can be about, but for a stop
         this.store.receive(message);
         if (message.type === 'welcome') this.emergency.again();
+        // An echo of each stamp: what this page has set going needs a sign of life within 400 ms.
+        if (message.type === 'stamp' && this.store.experiments.needs_sign_of_life(this.store.actor.peek()))
+          this.keep_alive();
       },
       () => this.on_phase(),
     );
@@ -307,8 +312,20 @@ export class Session {
     } else if (now === 'live') {
       this.store.note('The live connection is up.');
       void this.load();
+      void this.load_experiments();
     }
   }
+
+  // SAFETY: a page that was loaded anew goes on giving signs of life for what it has begun, whatever it shows.
+  load_experiments = async (): Promise<void> => {
+    const { experiments } = this.store;
+    const asked_at = experiments.mark();
+    try {
+      experiments.take_open(await this.experiments.open(), asked_at);
+    } catch (error) {
+      this.store.note(error instanceof Error ? error.message : String(error));
+    }
+  };
 
   private on_hold(): void {
     const { robot_id, lapsed, error } = this.hold;

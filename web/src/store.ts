@@ -6,6 +6,7 @@ import { batch, computed, signal } from '@preact/signals';
 import type { CommandRecord, EventRecord, LiveMessage, RobotState, RunRecord } from './api';
 import { natural_order } from './fleet';
 import { Latches } from './latches';
+import { ExperimentsStore } from './experiments_store';
 import { Robot } from './robot';
 import type { StopEvidence } from './stop_outcome';
 
@@ -37,6 +38,7 @@ export class Store {
   readonly interrupted = signal<RunRecord[]>([]); // of each robot its newest run, if the station stopped in it
   readonly latches = new Latches();
   readonly now_ms = signal(0); // page time, for ages
+  readonly experiments = new ExperimentsStore();
   private readonly by_id = new Map<string, Robot>();
   private pending_log: LogLine[] = [];
   private notes = 0;
@@ -79,7 +81,9 @@ export class Store {
       case 'problem':
         this.note(`The station refused a message of this page: ${message.problem.detail}`);
         break;
-      case 'experiment': // shown by what it does to the robot
+      case 'experiment':
+        this.experiments.take(message.experiment);
+        break;
       case 'stamp':
         break;
     }

@@ -29,6 +29,7 @@ export const kViews: readonly View[] = [
   { name: 'fleet', title: 'Fleet', key: 'f', load: () => import('./fleet') },
   { name: 'robot', title: 'Robot', key: 'r', load: () => import('./robot') },
   { name: 'runs', title: 'Runs', key: 'u', load: () => import('./runs/view') },
+  { name: 'experiments', title: 'Experiments', key: 'e', load: () => import('./experiments') },
   { name: 'station', title: 'Station', key: 's', load: () => import('./station') },
 ];
 

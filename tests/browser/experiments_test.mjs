@@ -1,0 +1,244 @@
+// Experiments on the page: a profile that is chosen or pasted, its prediction, start, pause, resume and abort, the queue of
+// a robot, and reservations; how it all fits on every screen.
+import assert from 'node:assert/strict';
+import { readFileSync } from 'node:fs';
+import { createRequire } from 'node:module';
+import { Bench, run, until } from './programs.mjs';
+
+const kRobot = 'rheo-1';
+const axe = readFileSync(createRequire(new URL('../../web/package.json', import.meta.url)).resolve('axe-core/axe.min.js'), 'utf8');
+const bench = new Bench();
+let page;
+
+const profile = (name, for_s, kind = 'setpoint') => `name = "${name}"
+purpose = "For the test of the page."
+
+[limits]
+position_min_m = -0.3
+position_max_m = 0.3
+
+[[step]]
+${kind === 'duty' ? 'kind = "duty"\nduty = 0.2' : 'kind = "setpoint"\nsetpoint_m = 0.05'}
+for_s = ${for_s}
+`;
+const go = (hash) => page.goto(`${bench.http}/#/experiments${hash}`);
+const robot = () => bench.ask(`/robots/${kRobot}`);
+const experiment = (id) => bench.ask(`/experiments/${id}`);
+const state = () => page.locator('#experiment-state').getAttribute('data-state');
+const shows = (what) => until(`the page shows ${what}`, async () => (await state()) === what);
+const id_shown = () => until('the address names the experiment', () => /#\/experiments\/(\d+)$/.exec(page.url())?.[1]);
+const is_at_rest = () => until('the robot is at rest', async () => {
+  const { mode, sample } = await robot();
+  return mode === 'manual' && sample.duty === 0;
+});
+
+// Writes a profile as a person who pastes it.
+async function paste(text) {
+  await go(`/new?profile=own&robot=${kRobot}`);
+  await page.locator('#profile-own[aria-pressed=true]').waitFor();
+  await page.fill('#profile-text', text);
+}
+
+async function start() {
+  await page.locator('#start-experiment:enabled').click();
+  return Number(await id_shown());
+}
+
+const kSizes = [[1440, 900], [1024, 768], [768, 1024], [390, 844], [844, 390]];
+const kThemes = { 1440: ['light', 'dark'], 390: ['dark'] }; // in which axe-core looks
+const unfit = []; // all of it is told at the end
+async function fits(where) {
+  for (const [width, height] of kSizes) {
+    await page.setViewportSize({ width, height });
+    const too_wide = await page.evaluate(() => document.documentElement.scrollWidth - innerWidth);
+    if (too_wide > 0) unfit.push(`${where} at ${width} × ${height} scrolls sideways by ${too_wide}`);
+    const stop = await page.locator('#emergency-stop').boundingBox();
+    if (!(stop && stop.y >= 0 && stop.y + stop.height <= height)) unfit.push(`${where} at ${width} × ${height}: the stop button is not in view`);
+    for (const colorScheme of kThemes[width] ?? []) {
+      await page.emulateMedia({ colorScheme });
+      await page.evaluate(axe);
+      const { violations } = await page.evaluate(() => axe.run(document, { resultTypes: ['violations'] }));
+      for (const { id, nodes } of violations) {
+        const places = nodes.map((node) => `${node.target} ${node.any[0]?.message ?? ''}`).slice(0, 3);
+        unfit.push(`${where} at ${width} × ${height}, ${colorScheme}: ${id}: ${places}`);
+      }
+    }
+  }
+  await page.setViewportSize({ width: 1440, height: 900 });
+}
+
+const steps = {
+  async 'a profile that comes with the program is predicted, and its check list says that nothing is in the way'() {
+    await page.goto(await bench.login_link());
+    bench.start_robot(kRobot);
+    await page.locator('.annunciator h1').getByText(kRobot).waitFor();
+    await page.keyboard.press('g');
+    await page.keyboard.press('e');
+    await page.locator('#queue .empty').waitFor();
+    await page.click('#tab-new');
+    await page.click('#profile-figure_7');
+    const figures = page.locator('.plan-figures');
+    await until('the prediction is there', async () => /0 to 15\d mm/.test(await figures.innerText().catch(() => '')));
+    assert.match(await figures.innerText(), /Takes\s+40 s/);
+    await until('nothing is in the way', async () => (await page.locator('#checks .ok').count()) === 6);
+    assert.equal(await page.locator('#checks .waits').count(), 0);
+    assert.match(await page.locator('#presence').innerText(), /This page must stay open/);
+    await fits('to begin one');
+  },
+
+  async 'what the text says is predicted while it is typed, also that it leaves its limits'() {
+    await page.locator('#profile-text').fill(profile('Too far', 10).replace('setpoint_m = 0.05', 'setpoint_m = 0.25').replace('position_max_m = 0.3', 'position_max_m = 0.25'));
+    await until('the overshoot is named', async () => /pass limits\.position_max_m \(250 mm\) after/.test(await page.locator('#plan-problems').innerText().catch(() => '')));
+    await page.click('#undo-text');
+    await until('it is gone', async () => (await page.locator('#plan-problems').count()) === 0);
+  },
+
+  async 'an error in a pasted profile stands at its line, before the start and as the station says it'() {
+    await paste(profile('Wrong', 10).replace('for_s', 'for_ever'));
+    const fault = page.locator('#profile-fault');
+    await until('the page marks the line', async () => (await fault.getAttribute('data-line')) === '8');
+    await paste(profile('Wrong', 10).replace('setpoint_m = 0.05', 'setpoint_m = 0.7'));
+    await until('the page can read it', async () => (await fault.getAttribute('data-line')) === '');
+    await page.locator('#start-experiment:enabled').click();
+    await until('the station names the line', async () => (await fault.getAttribute('data-line')) !== '');
+    assert.match(await fault.innerText(), /^Line \d+: .*setpoint_m is 0\.7/);
+    const line = Number(await fault.getAttribute('data-line'));
+    assert.ok(await page.locator('.editor li').nth(line - 1).evaluate((entry) => entry.classList.contains('wrong')));
+    assert.deepEqual((await bench.ask('/experiments')).experiments, [], 'nothing was begun');
+    await fits('a refused profile');
+  },
+
+  async 'nothing begins without the press on Start: not by Enter in a field, and not by an address'() {
+    await paste(profile('Not yet', 10));
+    await page.locator('#experiment-notes').fill('a note');
+    await page.locator('#experiment-notes').press('Enter');
+    await page.reload();
+    await page.locator('#start-experiment').waitFor();
+    await page.waitForTimeout(300);
+    assert.deepEqual((await bench.ask('/experiments')).experiments, []);
+  },
+
+  async 'a duty runs through, because the page gives signs of life'() {
+    await paste(profile('Duty', 3, 'duty'));
+    const id = await start();
+    await shows('done');
+    const { runs } = await experiment(id); // a busy browser may miss 400 ms: its step is repeated then
+    assert.ok(runs[0].steps.length >= 1);
+    assert.match(await page.locator('#experiment-runs').innerText(), /Done\s+run \d+/);
+    assert.equal(await page.locator('#experiment-runs a').getAttribute('href'), `#/runs/${runs[0].run_id}`);
+    await fits('one that is done');
+  },
+
+  async 'one that runs shows how far it is, pauses, resumes and is aborted'() {
+    await is_at_rest();
+    await paste(profile('Long', 60));
+    const id = await start();
+    await shows('running');
+    await until('its progress is shown', async () => /Run 1 of 1, [1-9]\d* of 60 s/.test(await page.locator('#experiment-progress').innerText().catch(() => '')));
+    await page.locator('#run-plot .track').waitFor();
+    assert.match(await page.locator('#presence').innerText(), /in the name of this page, which must stay open/);
+    await fits('one that runs');
+    await page.click('#pause-experiment');
+    await shows('paused');
+    await until('the robot rests', async () => (await robot()).mode === 'manual');
+    assert.match(await page.locator('#situation').innerText(), /Somebody asked for it/);
+    await page.click('#resume-experiment');
+    await shows('running');
+    await until('the robot moves again', async () => (await robot()).mode === 'auto');
+    await page.click('#abort-experiment');
+    await shows('aborted');
+    await until('the robot rests', async () => (await robot()).mode === 'manual');
+    assert.equal((await experiment(id)).reason, 'requested');
+    assert.equal(await page.locator('.acts button').count(), 0);
+  },
+
+  async 'the stop stops an experiment, from this page as from every other'() {
+    await is_at_rest();
+    await paste(profile('Stopped', 60));
+    await start();
+    await shows('running');
+    await page.keyboard.press('Escape');
+    await shows('aborted');
+    assert.equal((await robot()).mode, 'emergency');
+    assert.match(await page.locator('#situation').innerText(), /Somebody stopped the robot|The robot was in emergency/);
+    await go(`/new?profile=figure_7&robot=${kRobot}`);
+    await until('the check list says so', async () => /emergency\. Look at the robot, then clear/.test(await page.locator('#check-rest').innerText().catch(() => '')));
+    await page.locator('#start-experiment', { hasText: 'Put into the queue' }).waitFor();
+  },
+
+  async 'the queue shows what waits and why, and its order is changed'() {
+    const ids = [];
+    for (const name of ['First', 'Second', 'Third']) {
+      await paste(profile(name, 5));
+      ids.push(await start());
+      await shows('waiting');
+    }
+    assert.match(await page.locator('#situation').innerText(), /Others are before it/);
+    await page.click('#tab-queue');
+    const queue = page.locator(`#queue-${kRobot} .queue-list li`);
+    const order = async () => Promise.all((await queue.all()).map((entry) => entry.getAttribute('data-experiment').then(Number)));
+    await until('all wait', async () => (await queue.count()) === 3);
+    assert.deepEqual(await order(), ids);
+    assert.match(await queue.first().innerText(), /The robot is in emergency/);
+    await queue.nth(2).locator('.step-up').click();
+    await until('the third is second', async () => String(await order()) === String([ids[0], ids[2], ids[1]]));
+    await queue.nth(0).locator('.step-down').click();
+    await until('the third is first', async () => String(await order()) === String([ids[2], ids[0], ids[1]]));
+    await until('the station has the same first', async () => (await experiment(ids[2])).waits_for === 'emergency');
+    assert.equal((await experiment(ids[0])).waits_for, 'others');
+    await fits('the queue');
+    for (let left = 3; left > 0; --left) {
+      await queue.first().locator('.ends').click();
+      await until('it is gone', async () => (await queue.count()) === left - 1);
+    }
+    const ended = page.locator('#history tbody tr');
+    await until('all are in the history, newest first', async () => (await ended.first().locator('th').innerText()) === String(ids[2]));
+    assert.match(await ended.first().innerText(), /Cancelled/);
+    await fits('history');
+  },
+
+  async 'a reservation is made, shown, and cancelled; a time that cannot be is named'() {
+    await page.click('#tab-reservations');
+    await page.fill('#from-day', 'tomorrow');
+    await page.fill('#from-clock', 'noon');
+    await page.fill('#until-clock', '14:30');
+    await page.click('#reserve');
+    assert.match(await page.locator('#reserve-problem').innerText(), /^From: “noon” is no time/);
+    await page.fill('#from-clock', '12:00');
+    await page.fill('#purpose', 'tubes of bed 3');
+    await page.locator('#purpose').press('Enter');
+    const list = page.locator('.reservation-list li');
+    await until('it is listed', async () => (await list.count()) === 1);
+    assert.match(await list.innerText(), /12:00 to .* 14:30\s+for you: tubes of bed 3/);
+    await until('it is in the bars', async () => (await page.locator('#day-bars rect.mine').count()) === 1);
+    const [{ from_us, until_us }] = (await bench.ask('/reservations?over=false')).reservations;
+    assert.equal((until_us - from_us) / 3600e6, 2.5);
+    await fits('reservations');
+    await list.getByRole('button').click();
+    await until('it is gone', async () => (await list.count()) === 0);
+    assert.deepEqual((await bench.ask('/reservations?over=false')).reservations, []);
+  },
+
+  async 'nothing can be started while the page is cut off, and the last state is not shown as present'() {
+    await go(`/new?profile=figure_7&robot=${kRobot}`);
+    await page.locator('#start-experiment:enabled').waitFor();
+    await page.clock.install();
+    bench.station.process.kill('SIGSTOP');
+    try {
+      await page.clock.runFor(3000);
+      await page.locator('#start-experiment:disabled').waitFor();
+      assert.match(await page.locator('#start-note').innerText(), /Cut off from the station/);
+      assert.equal(await page.locator('#checks').count(), 0);
+    } finally {
+      bench.station.process.kill('SIGCONT');
+    }
+  },
+
+  'all of it fits on every screen, and axe-core finds nothing'() {
+    assert.deepEqual(unfit, []);
+  },
+};
+
+await run(bench, steps, async () => {
+  page = await bench.open_browser({ viewport: { width: 1440, height: 900 }, colorScheme: 'dark' });
+});

@@ -1,0 +1,250 @@
+// One experiment: how far it is, why it waits or has ended, what may be done with it, its runs and what was predicted.
+
+import { useComputed } from '@preact/signals';
+import { useLayoutEffect, useMemo } from 'preact/hooks';
+import type { Experiment, Prediction } from '../../experiments_api';
+import { has_ended, type ExperimentSummary } from '../../experiments_store';
+import { millimetres } from '../../format';
+import { format } from '../../route';
+import type { Robot } from '../../robot';
+import type { Session } from '../../session';
+import { useActs, useAsked } from './acts';
+import { ActsOfOne, Presence } from './acts_of_one';
+import { KnowledgePanel } from './knowledge';
+import type { Track } from './preview';
+import { RunsTable } from './runs_table';
+import { moment_text } from './slot_time';
+import { PlotWindow } from '../../samples';
+import { TrackPlot, type Measured } from './track_plot';
+import { how_long, kStates, progress_text, sentence_of, situation, who } from './words';
+
+export function OneExperiment({ session, id }: { session: Session; id: number }) {
+  const { store, experiments } = session;
+  const known = useComputed(() => store.experiments.find(id)).value;
+  // Its runs come with an answer of their own: again whenever /live says that something of them has changed.
+  const change = known
+    ? [known.state, JSON.stringify(known.run_counts), known.activity, known.progress?.run].join()
+    : '';
+  const asked = useAsked(session, async () => {
+    const asked_at = store.experiments.mark();
+    const found = await experiments.one(id);
+    store.experiments.take_answer([found], asked_at);
+    return found;
+  }, [id, change]);
+  const whole = asked.answer?.experiment_id === id ? asked.answer : null;
+  const summary = known ?? whole;
+  // SAFETY: Escape is for the robot that is looked at. An experiment that goes on, and that the page knows, selects it in the
+  // call in which it is opened; one that has to be asked for does not move the name on the stop button: see StopNote.
+  useLayoutEffect(() => {
+    const opened = store.experiments.find(id);
+    if (opened && !has_ended(opened) && store.find(opened.robot_id)) store.select(opened.robot_id);
+  }, [id]);
+
+  if (!summary) {
+    return asked.problem === '' ? (
+      <p class="quiet empty">Asking the station…</p>
+    ) : (
+      <div class="waiting">
+        <h2>There is no experiment {id} to be seen</h2>
+        <p role="alert">{asked.problem}</p>
+        <p>
+          <a href={format({ view: 'experiments' })}>All experiments</a>
+        </p>
+      </div>
+    );
+  }
+  return (
+    <div class="one">
+      <StopNote session={session} robot_id={summary.robot_id} is_over={has_ended(summary)} />
+      <Head session={session} experiment={summary} />
+      {whole && (
+        <>
+          <div class="one-plot">
+            <RunPlot session={session} experiment={whole} summary={summary} />
+            <KnowledgePanel runs={whole.runs} />
+          </div>
+          <section aria-label="Runs">
+            <h2>Runs</h2>
+            <RunsTable session={session} experiment={whole} />
+          </section>
+          <details class="document">
+            <summary>The profile as it is stored</summary>
+            <pre tabIndex={0}>{whole.profile}</pre>
+          </details>
+        </>
+      )}
+    </div>
+  );
+}
+
+function StopNote({ session, robot_id, is_over }: { session: Session; robot_id: string; is_over: boolean }) {
+  const { store } = session;
+  const selected_id = store.selected_id.value;
+  if (is_over || selected_id === robot_id || !store.find(robot_id)) return null;
+  return (
+    <p class="stop-note" id="stop-note" role="alert">
+      The stop button stops {selected_id ?? 'all robots'}; this experiment moves {robot_id}.{' '}
+      <button type="button" onClick={() => store.select(robot_id)}>
+        Let it stop {robot_id}
+      </button>
+    </p>
+  );
+}
+
+function Head({ session, experiment }: { session: Session; experiment: ExperimentSummary }) {
+  const acts = useActs();
+  const is_current = session.store.is_current.value;
+  const { state, progress, detail, waits_for_detail, robot_id, experiment_id } = experiment;
+  const me = session.store.actor.value;
+  const { what, todo } = situation(experiment);
+  const own_words = state === 'waiting' ? waits_for_detail : detail;
+  const is_over = has_ended(experiment);
+  const stale = !is_current && !is_over;
+  return (
+    <section class={`one-head ${stale ? 'stale' : ''}`} aria-label="State">
+      <div class="one-title">
+        <span class={`state lamp-like ${state}`} id="experiment-state" data-state={stale ? '' : state}>
+          {stale ? `Was: ${kStates[state]}` : kStates[state]}
+        </span>
+        <h2>{experiment.name}</h2>
+        <span class="quiet">
+          experiment {experiment_id} on <a href={format({ view: 'robot', parts: [robot_id] })}>{robot_id}</a>
+        </span>
+        <ActsOfOne session={session} experiment={experiment} acts={acts} />
+      </div>
+      {stale && (
+        <p class="problem" role="status">
+          Cut off from the station: what the robot does now is not known. Cut off for 3 s, the station ends what acts in
+          the name of this page.
+        </p>
+      )}
+      {progress && !is_over && (
+        <div class="one-progress">
+          <progress
+            max={progress.duration_s}
+            value={Math.min(progress.elapsed_s, progress.duration_s)}
+            aria-label="Of this run"
+          />
+          <output id="experiment-progress">{progress_text(experiment)}</output>
+        </div>
+      )}
+      {(what !== '' || own_words) && (
+        <p class="situation" id="situation">
+          {what} {todo !== '' && !is_over && <b>{todo}</b>}
+          {own_words && own_words !== experiment.activity && <span class="quiet"> {sentence_of(own_words)}</span>}
+          {state === 'waiting' && <WaitsSince experiment={experiment} session={session} />}
+        </p>
+      )}
+      <Presence session={session} experiment={experiment} />
+      <p class="problem" role="alert" id="act-problem">
+        {acts.problem.value}
+      </p>
+      <dl class="one-figures">
+        <Figure name="Begun by">{who(experiment.owner, me)}</Figure>
+        <Figure name="Acts for">{who(experiment.acts_for, me)}</Figure>
+        <Figure name="Asked">{moment_text(experiment.created_at_us)}</Figure>
+        {experiment.started_at_us !== null && <Figure name="Begun">{moment_text(experiment.started_at_us)}</Figure>}
+        {experiment.ended_at_us !== null && <Figure name="Ended">{moment_text(experiment.ended_at_us)}</Figure>}
+        <Figure name="Takes">{how_long(experiment.duration_s)}</Figure>
+        <Figure name="Priority">{`${experiment.priority}`.replace('-', '−')}</Figure>
+        {experiment.notes !== '' && <Figure name="Notes">{experiment.notes}</Figure>}
+      </dl>
+    </section>
+  );
+}
+
+function Figure({ name, children }: { name: string; children: preact.ComponentChildren }) {
+  return (
+    <div>
+      <dt>{name}</dt>
+      <dd>{children}</dd>
+    </div>
+  );
+}
+
+function WaitsSince({ session, experiment }: { session: Session; experiment: ExperimentSummary }) {
+  void session.store.now_ms.value;
+  const waited_s = Math.floor((Date.now() * 1000 - experiment.created_at_us) / 1e6);
+  return <span class="quiet"> Waits for {how_long(Math.max(0, waited_s))}.</span>;
+}
+
+interface RunPlotProps {
+  session: Session;
+  experiment: Experiment;
+  summary: ExperimentSummary;
+}
+
+// The run that goes on, or else the last one that has a prediction: predicted, and measured as far as it is recorded.
+function RunPlot({ session, experiment, summary }: RunPlotProps) {
+  const run = experiment.runs.filter((each) => each.has_prediction).at(-1) ?? null;
+  const number = run?.number ?? 0;
+  const prediction = useAsked<Prediction | null>(
+    session,
+    () => (number === 0 ? Promise.resolve(null) : session.experiments.prediction(experiment.experiment_id, number)),
+    [experiment.experiment_id, number],
+  );
+  const is_now = run !== null && summary.progress?.run === number && run.ended_at_us === null;
+  const elapsed_s = is_now ? (summary.progress?.elapsed_s ?? null) : null;
+  const measured = useMeasured(session.store.find(summary.robot_id), elapsed_s);
+  const track = useMemo(() => track_of_prediction(prediction.answer), [prediction.answer]);
+  if (!run) return null;
+  const { answer } = prediction;
+  if (answer?.error)
+    return (
+      <p class="quiet">
+        There is no prediction of run {number}: {answer.error}
+      </p>
+    );
+  if (!track || !answer) return <p class="quiet empty">Asking for the prediction…</p>;
+  const has_band = (answer.position_sd_m ?? null) !== null;
+  return (
+    <section aria-label="Prediction and measurement" id="run-plot">
+      <h2>Run {number}</h2>
+      <TrackPlot
+        track={track}
+        measured={measured}
+        at_s={elapsed_s}
+        label={`Run ${number}: predicted from ${millimetres(answer.position_min_m ?? null, 0)} to ${millimetres(answer.position_max_m ?? null, 0)} mm`}
+      />
+      <p class="track-legend">
+        {measured && <span class="key measured">position, estimated</span>}{' '}
+        <span class="key predicted">predicted{has_band ? ' ± 2 sd' : ''}</span>{' '}
+        <span class="key setpoint">setpoint</span> <span class="key duty">duty, predicted</span>
+        <span class="quiet">
+          {' '}
+          On the model {answer.model_of}, stored before the run{has_band ? '' : '; how sure it is, is not known'}
+          {answer.ignores_flow ? '; without the flow of the pump' : ''}.
+        </span>
+      </p>
+      {(answer.problems ?? []).map((problem) => (
+        <p key={problem} class="plan-problem">
+          {sentence_of(problem)}
+        </p>
+      ))}
+    </section>
+  );
+}
+
+function track_of_prediction(prediction: Prediction | null): Track | null {
+  if (!prediction?.t_s) return null;
+  const { t_s, position_m = [], duty = [], setpoint_m = [], position_sd_m = null } = prediction;
+  return { t_s, position_m, duty, setpoint_m, position_sd_m };
+}
+
+const kCapacity = 8192;
+
+// Where the robot believed that it was since the run began, as far as this page has received it.
+function useMeasured(robot: Robot | undefined, elapsed_s: number | null): Measured | null {
+  const window = useMemo(() => new PlotWindow(kCapacity, ['estimate_m'], 0), []);
+  return useMemo(() => {
+    if (!robot || elapsed_s === null) return null;
+    window.fill(robot.ring, performance.now() / 1000, elapsed_s);
+    const t_s: number[] = [];
+    const position_m: number[] = [];
+    for (let i = 0; i < window.size; ++i) {
+      t_s.push((window.time_s[i] ?? 0) + elapsed_s);
+      position_m.push(window.values[0]?.[i] ?? NaN);
+    }
+    return { t_s, position_m };
+  }, [robot, elapsed_s]);
+}
