@@ -9,6 +9,7 @@ import './style/top_bar.css';
 import './style/panels.css';
 import './style/readouts.css';
 import './style/charts.css';
+import './style/plots.css';
 import './style/controls.css';
 import './style/stop.css';
 import './style/small_screens.css';

@@ -30,7 +30,7 @@ export default function RobotView({ session, route }: ViewProps) {
           <>
             <ModeAnnunciator robot={robot} is_current={session.store.is_current.value} />
             <Readouts robot={robot} />
-            <Plots robot={robot} />
+            <Plots session={session} robot={robot} />
           </>
         ) : (
           <Waiting session={session} />
