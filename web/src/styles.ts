@@ -8,6 +8,7 @@ import './style/shell.css';
 import './style/top_bar.css';
 import './style/panels.css';
 import './style/readouts.css';
+import './style/vessel.css';
 import './style/charts.css';
 import './style/plots.css';
 import './style/controls.css';

@@ -1,11 +1,10 @@
-// The large numerals, and a scale that shows position, reference and setpoint as one glance.
+// The large numerals.
 //
 // Two positions stand side by side, always: where the robot believes that it is, and what its controller sees, which a
 // disturbance moves away from that. Each has its "±" and its own distance to the setpoint.
 
 import { age, millimetres, millimetres_per_s, millivolts, percent, plus_minus } from '../format';
 import type { Robot } from '../robot';
-import { Tape } from './tape';
 
 export function Readouts({ robot }: { robot: Robot }) {
   const now = robot.readout.value;
@@ -38,7 +37,6 @@ export function Readouts({ robot }: { robot: Robot }) {
         <Numeral name="Velocity" unit="mm/s" value={millimetres_per_s(now.velocity_m_s)} kind="small" id="velocity" />
         <Numeral name="Impedance" unit="mV" value={millivolts(now.impedance_mv)} kind="small" id="impedance" />
       </div>
-      <Tape robot={robot} />
     </section>
   );
 }
