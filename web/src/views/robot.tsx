@@ -22,7 +22,7 @@ export default function RobotView({ session, route }: ViewProps) {
     <>
       <aside class="side" aria-label="Robots and link">
         <RobotList session={session} />
-        {robot && !is_other && <LinkPanel robot={robot} />}
+        {robot && !is_other && <LinkPanel robot={robot} is_current={session.store.is_current.value} />}
       </aside>
       <main class="scope" aria-label={robot ? `Robot ${robot.robot_id}` : 'No robot'}>
         {is_other ? (
