@@ -18,6 +18,7 @@ import type { Robot } from '../robot';
 import { change_query, route } from '../route';
 import type { Session } from '../session';
 import { browser_shelf } from '../settings';
+import { ThresholdList } from './threshold_list';
 
 const kRingSamples = 65_536; // ten minutes at 100 Hz
 const kSamplesOfTile = 2000;
@@ -268,7 +269,9 @@ export function Plots({ session, robot }: { session: Session; robot: Robot }) {
         settings={plot_settings}
         on_live={() => scene.run()}
         on_span={(span_s) => scene.choose_span(span_s)}
-      />
+      >
+        <ThresholdList />
+      </PlotBar>
       <div
         class={`strips ${is_dragging.value ? 'dragging' : ''}`}
         ref={host}

@@ -24,9 +24,10 @@ interface BarProps {
   settings: PlotSettings;
   on_live(): void;
   on_span(span_s: number): void;
+  children?: preact.ComponentChildren;
 }
 
-export function PlotBar({ state, note, settings, on_live, on_span }: BarProps) {
+export function PlotBar({ state, note, settings, on_live, on_span, children }: BarProps) {
   const { is_live, span_s, range } = state.value;
   const { is_utc } = settings.kept.value;
   return (
@@ -60,6 +61,7 @@ export function PlotBar({ state, note, settings, on_live, on_span }: BarProps) {
       >
         {is_utc ? 'UTC' : 'Local time'}
       </button>
+      {children}
       <TraceList settings={settings} />
     </div>
   );

@@ -10,6 +10,7 @@ import { Plots } from '../parts/plots';
 import { Readouts } from '../parts/readouts';
 import { RobotList } from '../parts/robot_list';
 import { RunControl } from '../parts/run_control';
+import { AlertLine } from '../parts/threshold_list';
 import { Vessel } from '../parts/vessel';
 import type { Session } from '../session';
 import type { ViewProps } from './table';
@@ -30,6 +31,7 @@ export default function RobotView({ session, route }: ViewProps) {
         ) : robot ? (
           <>
             <ModeAnnunciator robot={robot} is_current={session.store.is_current.value} />
+            <AlertLine session={session} robot={robot} />
             <Readouts robot={robot} />
             <Vessel session={session} robot={robot} />
             <Plots session={session} robot={robot} />
