@@ -19,7 +19,11 @@ export type Control = Schemas['Control'];
 export type ControlBody = Schemas['ControlBody'];
 export type EventRecord = Schemas['Event'];
 export type RunRecord = Schemas['Run'];
+export type MarkerRecord = Schemas['Marker'];
+export type Overview = Schemas['Overview'];
+export type ParametersInForce = Schemas['ParametersInForce'];
 export type Station = Schemas['Station'];
+export type StoredSample = Schemas['StoredSample'];
 export type Recording = Schemas['Recording'];
 export type Me = Schemas['Me'];
 export type User = Schemas['User'];
@@ -131,6 +135,26 @@ export class Api {
     this.ask<RunRecord>('POST', '/runs', { robot_id, name, ...(fluid === '' ? {} : { fluid }) }); // '': not known
   end_run = (run_id: number) => this.ask<RunRecord>('POST', `/runs/${run_id}/end`);
 
+  // A robot's past. Times are UTC; `limit` and `points` bound what comes in one answer.
+  robot_samples = async (robot_id: string, from_us: number, to_us: number, limit: number) =>
+    (await this.ask<{ samples: StoredSample[] }>('GET', past(robot_id, 'samples', { from_us, to_us, limit }))).samples;
+  robot_overview = (robot_id: string, from_us: number, to_us: number, points: number) =>
+    this.ask<Overview>('GET', past(robot_id, 'overview', { from_us, to_us, points }));
+  robot_events = async (robot_id: string) =>
+    (await this.ask<{ events: EventRecord[] }>('GET', past(robot_id, 'events', { limit: 1000 }))).events;
+  robot_commands = async (robot_id: string) =>
+    (await this.ask<{ commands: CommandRecord[] }>('GET', past(robot_id, 'commands', { limit: 1000 }))).commands;
+  robot_markers = async (robot_id: string, after: number) =>
+    (
+      await this.ask<{ markers: MarkerRecord[] }>(
+        'GET',
+        past(robot_id, 'markers', after > 0 ? { after, limit: 1000 } : { limit: 1000 }),
+      )
+    ).markers;
+  robot_runs = async (robot_id: string) =>
+    (await this.ask<{ runs: RunRecord[] }>('GET', `/runs?robot_id=${encodeURIComponent(robot_id)}&limit=200`)).runs;
+  robot_parameters = (robot_id: string) => this.ask<ParametersInForce>('GET', past(robot_id, 'parameters', {}));
+
   log_in = (user: string, password: string) => this.ask<Me>('POST', '/login', { user, password });
   log_out = () => this.ask<object>('POST', '/logout');
   me = () => this.ask<Me>('GET', '/me');
@@ -193,6 +217,13 @@ export class Api {
     throw error_of(answer.status, content as Partial<Problem> | null, Number(answer.headers?.get('Retry-After') ?? 0));
   }
 }
+
+const past = (robot_id: string, what: string, query: Record<string, number>) =>
+  `/robots/${encodeURIComponent(robot_id)}/${what}${query_of(query)}`;
+const query_of = (query: Record<string, number>) => {
+  const members = Object.entries(query).map(([name, value]) => `${name}=${value}`);
+  return members.length === 0 ? '' : `?${members.join('&')}`;
+};
 
 function error_of(status: number, problem: Partial<Problem> | null, retry_after_s: number): ApiError {
   const reason = problem?.reason ?? '';

@@ -1,11 +1,15 @@
-// Strip charts: uPlot dressed as a recorder, with a fixed graticule under traces that run to the left.
+// A strip chart, dressed as a recorder: a graticule under traces that run to the left.
 //
-// A StripChart draws one PlotWindow. ChartDeck runs all charts of a robot in one animation loop, at most 30 times a
-// second and not at all while the page is hidden, and holds what they share: running, looked at, or zoomed.
+// uPlot draws the axes. The traces are columns of a TraceWindow, which all strips of a robot share, and are drawn by
+// plots/trace_painter.ts; what is drawn under and over them (gaps, runs, marks) is handed in. When it draws, and what
+// stretch, is the deck's (plots/deck.ts).
 
 import uPlot from 'uplot';
+import { paint_band, paint_trace, type Pen, type Plane } from './plots/trace_painter';
+import type { TraceWindow } from './plots/trace_window';
+import { clock_label, clock_splits, type Stretch } from './plots/time_axis';
 import { next_range, range_splits } from './range';
-import { PlotWindow, type Column, type SampleRing } from './samples';
+import type { Column } from './samples';
 
 export interface Trace {
   column: Column;
@@ -28,44 +32,61 @@ export interface StripOptions {
   fixed_range?: [number, number];
   least_span?: number; // of a range that follows the data
   splits?: number[];
-  show_time: boolean;
+  is_large?: boolean;
 }
 
-export const kSpan_s = 60;
-const kTimeSplits_s = [-60, -50, -40, -30, -20, -10, 0];
-const kFrame_ms = 1000 / 30 - 4; // animation frames come each 16.7 ms: every second one is drawn
-export const kLook_ms = 4000; // a pointer at rest for this long no longer holds the charts
+export interface Painters {
+  under(context: CanvasRenderingContext2D, x_of: (time_s: number) => number, box: Box): void;
+  over(context: CanvasRenderingContext2D, x_of: (time_s: number) => number, box: Box): void;
+}
+export type Box = { left: number; top: number; width: number; height: number };
+
+export const kAxis_px = 58;
+export const kRight_px = 18;
+const kLabel_px = 110; // room that a clock time takes
 
 export class StripChart {
-  readonly window: PlotWindow;
   private plot: uPlot;
   private range: [number, number];
-  private view_s: [number, number] = [-kSpan_s, 0];
+  private view: Stretch = { from_s: 0, to_s: 1 };
+  private is_live = true;
+  private zone_s = 0;
+  private readonly at: number[]; // of each series, its column in the window
+  private readonly edges: number; // that are not ranged
   private readonly observer: ResizeObserver;
 
   constructor(
     private readonly host: HTMLElement,
     private readonly options: StripOptions,
-    capacity: number,
-    private readonly on_zoom: (from_s: number, to_s: number) => void,
-    private readonly on_cursor: (index: number | null) => void,
+    private readonly window: TraceWindow,
+    private readonly show_time: boolean,
+    private readonly painters: Painters,
+    on_size: () => void,
   ) {
-    const edges = options.band ? [options.band.low, options.band.high] : [];
-    this.window = new PlotWindow(capacity, [...edges, ...options.traces.map((trace) => trace.column)], edges.length);
+    const { band, traces } = options;
+    const edges = band ? [band.low, band.high] : [];
+    this.edges = edges.length;
+    this.at = [...edges, ...traces.map(({ column }) => column)].map((column) => window.names.indexOf(column));
     this.range = options.fixed_range ?? [-(options.least_span ?? 1) / 2, (options.least_span ?? 1) / 2];
     this.plot = this.build();
-    this.observer = new ResizeObserver(() => this.fit());
+    this.observer = new ResizeObserver(() => {
+      this.fit();
+      on_size();
+    });
     this.observer.observe(host);
   }
 
-  draw(view_s: [number, number]): void {
+  draw(view: Stretch, is_live: boolean, zone_s: number): void {
     const { window, options } = this;
-    this.view_s = view_s;
-    if (!options.fixed_range) this.range = next_range(this.range, window.low, window.high, options.least_span ?? 1);
-    const data = [window.time_s, ...window.values].map((column) => column.subarray(0, window.size));
+    Object.assign(this, { view, is_live, zone_s });
+    if (!options.fixed_range) {
+      const ranged = this.at.slice(this.edges);
+      const low = Math.min(...ranged.map((c) => window.low[c] as number));
+      const high = Math.max(...ranged.map((c) => window.high[c] as number));
+      this.range = next_range(this.range, low, high, options.least_span ?? 1);
+    }
     this.plot.batch(() => {
-      this.plot.setData(data as unknown as uPlot.AlignedData, false);
-      this.plot.setScale('x', { min: view_s[0], max: view_s[1] });
+      this.plot.setScale('x', { min: view.from_s, max: view.to_s });
       this.plot.setScale('y', { min: this.range[0], max: this.range[1] });
     });
   }
@@ -89,197 +110,98 @@ export class StripChart {
   private build(): uPlot {
     const style = getComputedStyle(this.host);
     const colour = (name: string) => style.getPropertyValue(name).trim();
-    const { band, traces, show_time, label } = this.options;
+    const { band, traces, label } = this.options;
     const font = `11px ${colour('--numerals')}`;
     const grid = { stroke: colour('--graticule'), width: 1 };
     const axis = { stroke: colour('--muted'), font, grid, ticks: { show: false }, border: { show: false } };
-    const edges: Trace[] = band ? [band.low, band.high].map((column) => ({ column, colour: '', width_px: 0 })) : [];
+    const pens = traces.map((trace) => ({ ...trace, colour: colour(trace.colour) }));
     const options: uPlot.Options = {
       width: Math.max(this.host.clientWidth, 50),
       height: Math.max(this.host.clientHeight, 40),
-      padding: [8, 18, show_time ? 0 : 8, 0],
+      padding: [8, kRight_px, this.show_time ? 0 : 8, 0],
       legend: { show: false },
-      cursor: {
-        sync: { key: 'deck', setSeries: false },
-        points: { size: 7, width: 1.5, fill: colour('--plot') },
-        y: false,
-        drag: { x: true, y: false, setScale: false },
-        bind: { dblclick: () => () => null },
-      },
+      cursor: { show: false },
       scales: {
-        x: { time: false, auto: false, range: () => this.view_s },
+        x: { time: false, auto: false, range: () => [this.view.from_s, this.view.to_s] },
         y: { auto: false, range: () => this.range },
       },
       axes: [
         {
           ...axis,
           show: true,
-          size: show_time ? 26 : 0,
+          size: this.show_time ? 26 : 0,
           gap: 6,
-          splits: () => this.time_splits(),
-          values: show_time ? (_, at) => at.map(time_label) : () => [],
+          splits: () => this.time_splits().at_s,
+          values: this.show_time ? (_, at) => this.time_labels(at) : () => [],
         },
         {
           ...axis,
-          size: 58,
+          size: kAxis_px,
           gap: 8,
           splits: () => this.options.splits ?? range_splits(this.range),
           values: (_, at) => at.map(label),
         },
       ],
-      bands: band ? [{ series: [2, 1], fill: colour(band.colour) }] : [],
-      series: [
-        {},
-        ...edges.map((edge, at) => this.series(edge, at, 'transparent')),
-        ...traces.map((trace, at) => this.series(trace, at + edges.length, colour(trace.colour))),
-      ],
+      series: [{}],
       hooks: {
-        setSelect: [(u) => this.selected(u)],
-        setCursor: [
-          (u) => this.on_cursor(u.cursor.left === undefined || u.cursor.left < 0 ? null : (u.cursor.idx ?? null)),
+        drawAxes: [(u) => this.painters.under(u.ctx, x_of(u), u.bbox)],
+        draw: [
+          (u) => this.draw_traces(u, band ? colour(band.colour) : '', pens),
+          (u) => this.painters.over(u.ctx, x_of(u), u.bbox),
+          (u) => this.draw_pen(u, colour('--plot'), pens.at(-1)?.colour ?? ''),
         ],
-        draw: [(u) => this.draw_pen(u, colour('--plot'), colour(traces.at(-1)?.colour ?? '--ink'))],
       },
     };
-    return new uPlot(options, [[], ...this.window.names.map(() => [])] as unknown as uPlot.AlignedData, this.host);
+    return new uPlot(options, [[]], this.host);
   }
 
-  private series(trace: Trace, at: number, stroke: string): uPlot.Series {
-    return {
-      stroke,
-      width: trace.width_px,
-      ...(trace.dash_px ? { dash: trace.dash_px } : {}),
-      points: { show: false },
-      gaps: (u) =>
-        (this.window.gaps_s[at] ?? []).map(([from_s, to_s]) => [
-          u.valToPos(from_s, 'x', true),
-          u.valToPos(to_s, 'x', true),
-        ]),
+  private draw_traces(u: uPlot, spread: string, pens: Pen[]): void {
+    const { window, view, range, edges } = this;
+    const { ctx: context, bbox: box } = u;
+    const [per_s, per_unit] = [box.width / (view.to_s - view.from_s), box.height / (range[1] - range[0])];
+    const plane: Plane = {
+      box,
+      x_of: (time_s) => box.left + (time_s - view.from_s) * per_s,
+      y_of: (value) => box.top + (range[1] - value) * per_unit,
+      ratio: devicePixelRatio,
     };
+    context.save();
+    context.beginPath();
+    context.rect(box.left, box.top, box.width, box.height);
+    context.clip();
+    if (edges > 0) paint_band(context, window, this.at[0] as number, this.at[1] as number, plane, spread);
+    pens.forEach((pen, at) => paint_trace(context, window, this.at[at + edges] as number, plane, pen));
+    context.restore();
   }
 
-  private time_splits(): number[] {
-    const [from, to] = this.view_s;
-    return from === -kSpan_s && to === 0 ? kTimeSplits_s : range_splits(this.view_s);
+  private time_splits(): { at_s: number[]; step_s: number } {
+    const most = Math.max(2, Math.floor((this.host.clientWidth - kAxis_px - kRight_px) / kLabel_px));
+    return clock_splits(this.view, most, this.zone_s);
+  }
+
+  private time_labels(at: number[]): string[] {
+    const { step_s } = this.time_splits();
+    return at.map((time_s) => clock_label(time_s, step_s, this.zone_s));
   }
 
   // The pen: a dot where the main trace ends now.
   private draw_pen(u: uPlot, fill: string, stroke: string): void {
     const last = this.window.size - 1;
-    if (last < 0 || this.view_s[1] !== 0) return;
+    if (last < 0 || !this.is_live) return;
     const time_s = this.window.time_s[last] as number;
-    if (time_s < -0.5) return;
+    const value = this.window.value_at(this.options.traces.at(-1)?.column as Column, last);
+    if (time_s < this.view.to_s - 0.5 || value === null) return;
     const ratio = devicePixelRatio;
+    u.ctx.save(); // uPlot remembers what it has set, and sets nothing twice
     u.ctx.beginPath();
-    u.ctx.arc(
-      u.valToPos(time_s, 'x', true),
-      u.valToPos(this.window.values.at(-1)?.[last] as number, 'y', true),
-      3.5 * ratio,
-      0,
-      7,
-    );
+    u.ctx.arc(u.valToPos(time_s, 'x', true), u.valToPos(value, 'y', true), 3.5 * ratio, 0, 7);
     u.ctx.fillStyle = fill;
     u.ctx.fill();
     u.ctx.lineWidth = 2 * ratio;
     u.ctx.strokeStyle = stroke;
     u.ctx.stroke();
-  }
-
-  private selected(u: uPlot): void {
-    if (u.select.width < 8) return;
-    const from_s = u.posToVal(u.select.left, 'x');
-    const to_s = u.posToVal(u.select.left + u.select.width, 'x');
-    u.setSelect({ left: 0, width: 0, top: 0, height: 0 }, false);
-    this.on_zoom(from_s, to_s);
+    u.ctx.restore();
   }
 }
 
-const time_label = (time_s: number) =>
-  Math.abs(time_s) < 1e-6 ? 'now' : `\u2212${Number(Math.abs(time_s).toFixed(2))} s`;
-
-export type DeckState = 'running' | 'looked_at' | 'zoomed';
-
-export class ChartDeck {
-  state: DeckState = 'running';
-  private readonly charts: StripChart[] = [];
-  private view_s: [number, number] = [-kSpan_s, 0];
-  private frame = 0;
-  private drawn_at_ms = 0;
-  private looked_at_ms = 0;
-
-  constructor(
-    private ring: SampleRing,
-    private readonly on_state: (state: DeckState) => void,
-  ) {
-    this.frame = requestAnimationFrame(this.tick);
-  }
-
-  // on_cursor gets which sample the pointer is at, null when it left.
-  add(host: HTMLElement, options: StripOptions, on_cursor: (index: number | null, window: PlotWindow) => void): void {
-    const chart: StripChart = new StripChart(
-      host,
-      options,
-      this.ring.capacity,
-      (from_s, to_s) => this.zoom(from_s, to_s),
-      (index) => on_cursor(index, chart.window),
-    );
-    this.charts.push(chart);
-  }
-
-  show(ring: SampleRing): void {
-    this.ring = ring;
-    this.run();
-  }
-
-  // The pointer moved over a chart: hold still, so that a value can be read.
-  look(): void {
-    this.looked_at_ms = performance.now();
-    if (this.state === 'running') this.enter('looked_at');
-  }
-
-  look_away(): void {
-    if (this.state === 'looked_at') this.run();
-  }
-
-  zoom(from_s: number, to_s: number): void {
-    this.view_s = [from_s, to_s];
-    this.enter('zoomed');
-    for (const chart of this.charts) chart.draw(this.view_s);
-  }
-
-  run(): void {
-    this.view_s = [-kSpan_s, 0];
-    this.enter('running');
-  }
-
-  restyle(): void {
-    for (const chart of this.charts) {
-      chart.restyle();
-      chart.draw(this.view_s);
-    }
-  }
-
-  destroy(): void {
-    cancelAnimationFrame(this.frame);
-    for (const chart of this.charts) chart.destroy();
-  }
-
-  private enter(state: DeckState): void {
-    if (state === this.state) return;
-    this.state = state;
-    this.on_state(state);
-  }
-
-  private readonly tick = (now_ms: number): void => {
-    this.frame = requestAnimationFrame(this.tick);
-    if (now_ms - this.drawn_at_ms < kFrame_ms) return;
-    this.drawn_at_ms = now_ms;
-    if (this.state === 'looked_at' && now_ms - this.looked_at_ms > kLook_ms) this.run();
-    if (this.state !== 'running') return;
-    const edge_s = this.ring.edge_s(now_ms / 1000);
-    for (const chart of this.charts) {
-      chart.window.fill(this.ring, edge_s, kSpan_s);
-      chart.draw(this.view_s);
-    }
-  };
-}
+const x_of = (u: uPlot) => (time_s: number) => u.valToPos(time_s, 'x', true);

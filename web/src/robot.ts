@@ -139,6 +139,13 @@ export class Robot {
     return (this.made_ring ??= new SampleRing());
   }
 
+  // UTC less the times of its ring, by the station's estimate of the robot's clock; without one by this computer's clock.
+  utc_shift_s(utc_minus_steady_us: number | null, page_utc_s: number): number {
+    const offset_us = this.state.peek().clock?.offset_us;
+    if (offset_us === undefined || utc_minus_steady_us === null) return page_utc_s;
+    return (offset_us + utc_minus_steady_us) / 1e6 - this.ring.time_base_s;
+  }
+
   take(state: RobotState, now_ms: number): void {
     this.state.value = state;
     this.stated_at_ms = now_ms;
@@ -183,6 +190,7 @@ export class Robot {
       this.received = 0;
     }
     const before = this.ring.received;
+    this.ring.round_trip_us = this.state.peek().clock?.round_trip_us ?? NaN;
     this.ring.append(message, now_ms / 1000);
     if (message.first_seq >= this.first_seq) this.received += this.ring.received - before;
     if (message.first_seq + size <= this.next_seq) return; // sent again: history, not news

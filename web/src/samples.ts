@@ -1,8 +1,8 @@
-// The last minutes of one robot's samples in fixed memory, and the part of them that a plot shows.
+// The last minutes of one robot's samples in fixed memory.
 //
 // A slot is chosen by the sample's number, so a batch that is sent again later falls into its place and a lost sample
 // simply stays missing. Each boot of the robot counts from 0 again; `base` lines the boots up with one slot between
-// them. Times on the plot are page time in seconds (performance.now() / 1000), laid on the robot's own clock at the
+// them. Times in it are page time in seconds (performance.now() / 1000), laid on the robot's own clock at the
 // first batch of a boot: the spacing of samples is the robot's, never that of their arrival.
 
 import type { SamplesMessage } from './api';
@@ -11,13 +11,14 @@ import { kBatchNumbers, kSampleFields } from './telemetry_fields';
 
 // Every number of a live batch, and what is computed of it: position_m is what the controller sees, the disturbance
 // included; estimate_m where the robot believes that it is, and estimate_low_m and estimate_high_m lie two standard
-// deviations below and above that.
+// deviations below and above that. round_trip_us is the link's at the time when the sample came.
 export const kColumns = [
   ...kSampleFields,
   ...kBatchNumbers,
   'estimate_m',
   'estimate_low_m',
   'estimate_high_m',
+  'round_trip_us',
 ] as const;
 export type Column = (typeof kColumns)[number];
 
@@ -37,18 +38,19 @@ const kGapPeriods = 1.5;
 const kEdgeRelaxation = 0.02;
 
 export class SampleRing {
-  readonly capacity: number;
-  readonly time_s: Float64Array;
-  readonly columns: Record<Column, Float64Array>;
+  capacity: number;
+  time_s: Float64Array;
+  columns: Record<Column, Float64Array>;
   received = 0; // samples, without repetitions
-  private readonly slot_index: Float64Array; // the running index held by a slot, -1: none
+  round_trip_us = NaN; // of the link now
+  period_s = 0.01;
+  time_base_s = 0; // page time = robot time + this, of the newest boot
+  private slot_index: Float64Array; // the running index held by a slot, -1: none
   private boot_id = '';
   private base = 0; // running index = base + seq
   private newest = -1; // highest running index
-  private time_base_s = 0; // page time = robot time + this
   private lead_s = -Infinity; // how far the newest sample is ahead of page time
   private lead_at_s = 0;
-  private period_s = 0.01;
 
   constructor(capacity = 8192) {
     this.capacity = capacity;
@@ -57,6 +59,21 @@ export class SampleRing {
     this.columns = Object.fromEntries(
       kColumns.map((name) => [name, new Float64Array(capacity)]),
     ) as typeof this.columns;
+  }
+
+  // Makes room for more of what comes, and keeps what there is.
+  grow(capacity: number): void {
+    if (capacity <= this.capacity) return;
+    const grown = new SampleRing(capacity);
+    for (let index = this.first_index; index < this.next_index; ++index) {
+      if (!this.holds(index)) continue;
+      const [from, to] = [index % this.capacity, index % capacity];
+      grown.slot_index[to] = index;
+      grown.time_s[to] = this.time_s[from] as number;
+      for (const name of kColumns) grown.columns[name][to] = this.columns[name][from] as number;
+    }
+    const { time_s, columns, slot_index } = grown;
+    Object.assign(this, { capacity, time_s, columns, slot_index });
   }
 
   // Lays a batch down; page_now_s is when it arrived.
@@ -88,6 +105,7 @@ export class SampleRing {
       this.columns.estimate_m[slot] = estimate_m;
       this.columns.estimate_low_m[slot] = estimate_m - spread_m;
       this.columns.estimate_high_m[slot] = estimate_m + spread_m;
+      this.columns.round_trip_us[slot] = batch.backfill ? NaN : this.round_trip_us;
     }
     if (first + size - 1 <= this.newest) return; // sent again: the edge is led by new samples alone
     this.newest = first + size - 1;
@@ -121,69 +139,5 @@ export class SampleRing {
     this.newest = -1;
     this.boot_id = '';
     this.received = 0;
-  }
-}
-
-// What a plot draws: times relative to the right edge, values without holes, and the stretches that are not drawn.
-export class PlotWindow {
-  readonly time_s: Float64Array;
-  readonly values: Float64Array[];
-  readonly gaps_s: [number, number][][];
-  private readonly in_hole: boolean[]; // the sample before had no value
-  size = 0;
-  low = 0; // over all columns that are ranged
-  high = 0;
-
-  // The first `unranged` columns do not count in low and high.
-  constructor(
-    capacity: number,
-    readonly names: readonly Column[],
-    private readonly unranged = 0,
-  ) {
-    this.time_s = new Float64Array(capacity);
-    this.values = names.map(() => new Float64Array(capacity));
-    this.gaps_s = names.map(() => []);
-    this.in_hole = names.map(() => false);
-  }
-
-  // Takes from the ring what lies in [edge - span, edge].
-  fill(ring: SampleRing, edge_s: number, span_s: number): void {
-    this.size = 0;
-    this.low = Infinity;
-    this.high = -Infinity;
-    for (const gaps of this.gaps_s) gaps.length = 0;
-    this.in_hole.fill(false);
-    let previous_s = -Infinity;
-    for (let index = ring.first_index; index < ring.next_index; ++index) {
-      if (!ring.holds(index)) continue;
-      const slot = index % ring.capacity;
-      const time_s = (ring.time_s[slot] ?? 0) - edge_s;
-      if (time_s < -span_s - ring.gap_s || time_s > ring.gap_s) continue;
-      if (time_s <= previous_s) continue; // a boot that overlaps the one before
-      this.put(ring, slot, time_s, time_s - previous_s > ring.gap_s && this.size > 0 ? previous_s : null);
-      previous_s = time_s;
-    }
-  }
-
-  private put(ring: SampleRing, slot: number, time_s: number, gap_from_s: number | null): void {
-    const at = this.size;
-    this.time_s[at] = time_s;
-    for (let c = 0; c < this.names.length; ++c) {
-      const name = this.names[c] as Column;
-      const values = this.values[c] as Float64Array;
-      const gaps = this.gaps_s[c] as [number, number][];
-      const value = ring.columns[name][slot] as number;
-      const last = gaps[gaps.length - 1];
-      if (gap_from_s !== null) gaps.push([gap_from_s, time_s]);
-      else if (this.in_hole[c] && last) last[1] = time_s;
-      const missing = !Number.isFinite(value);
-      if (missing && !this.in_hole[c]) gaps.push([time_s, time_s]);
-      this.in_hole[c] = missing;
-      values[at] = missing ? (at > 0 ? (values[at - 1] as number) : 0) : value; // a missing one lies in a gap
-      if (missing || c < this.unranged) continue;
-      this.low = Math.min(this.low, value);
-      this.high = Math.max(this.high, value);
-    }
-    this.size += 1;
   }
 }

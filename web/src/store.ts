@@ -26,6 +26,7 @@ export interface LogLine {
 export class Store {
   readonly robots = signal<Robot[]>([]);
   readonly actor = signal(''); // this page, as the station calls it
+  utc_minus_steady_us: number | null = null; // of the station's clocks; null before its first message
   readonly selected_id = signal<string | null>(null);
   readonly selected = computed(() => {
     void this.robots.value;
@@ -54,6 +55,7 @@ export class Store {
         batch(() => {
           this.actor.value = message.actor;
           this.take_states(message.robots, false);
+          this.utc_minus_steady_us = message.utc_us - message.stamp_us;
         });
         break;
       case 'robot':

@@ -1,11 +1,12 @@
 // The ring of samples and the window that a plot takes from it.
 import { expect, test } from 'vitest';
-import { PlotWindow, SampleRing } from '../src/samples';
+import { TraceWindow } from '../src/plots/trace_window';
+import { SampleRing, type Column } from '../src/samples';
 import { batch } from './fakes';
 
-function window_of(ring: SampleRing, edge_s: number, span_s = 60): PlotWindow {
-  const window = new PlotWindow(ring.capacity, ['position_m', 'setpoint_m']);
-  window.fill(ring, edge_s, span_s);
+function window_of(ring: SampleRing, edge_s: number, columns: Column[] = ['position_m', 'setpoint_m']): TraceWindow {
+  const window = new TraceWindow(8192, columns);
+  window.fill({ ring, shift_s: 0, past: null }, { from_s: edge_s - 60, to_s: edge_s }, 6000); // every sample as it is
   return window;
 }
 
@@ -95,17 +96,15 @@ test('the right edge moves evenly while batches arrive unevenly', () => {
 test('of a disturbance both positions are kept, and the spread lies around where the robot is', () => {
   const ring = new SampleRing(64);
   ring.append(batch(0, 5, { disturbance_m: -0.05, position_m: [0.1, 0.1, 0.1, 0.1, 0.1], position_sd_m: 0.003 }), 10);
-  const window = new PlotWindow(ring.capacity, ['estimate_low_m', 'estimate_high_m', 'position_m', 'estimate_m'], 2);
-  window.fill(ring, 10, 60);
+  const window = window_of(ring, 10, ['estimate_low_m', 'estimate_high_m', 'position_m', 'estimate_m']);
   expect(window.values.map((column) => Number(column[0]?.toFixed(9)))).toEqual([0.144, 0.156, 0.1, 0.15]);
-  expect([window.low, window.high].map((edge) => Number(edge.toFixed(9)))).toEqual([0.1, 0.15]); // the band is not ranged
+  expect([...window.low].map((edge) => Number(edge.toFixed(9)))).toEqual([0.144, 0.156, 0.1, 0.15]);
 });
 
 test('a spread that is not known is not drawn, and the estimate is', () => {
   const ring = new SampleRing(64);
   ring.append(batch(0, 5, { position_sd_m: null }), 10);
-  const window = new PlotWindow(ring.capacity, ['estimate_low_m', 'estimate_m']);
-  window.fill(ring, 10, 60);
+  const window = window_of(ring, 10, ['estimate_low_m', 'estimate_m']);
   expect(window.gaps_s[0]).toHaveLength(1);
   expect(window.gaps_s[1]).toHaveLength(0);
 });

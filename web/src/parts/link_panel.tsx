@@ -1,14 +1,15 @@
-// The quality of the link and the health of the robot, as a column of figures.
+// The quality of the link and the health of the robot, as a column of figures; of the recording one line, with its figures
+// on demand.
 
+import { useSignal } from '@preact/signals';
 import { count, milliseconds_of_us, percent, volts_of_mv } from '../format';
+import { recording_line } from '../recording_line';
 import { changed_limits_of, type Robot } from '../robot';
 
-export function LinkPanel({ robot }: { robot: Robot }) {
+export function LinkPanel({ robot, is_current = true }: { robot: Robot; is_current?: boolean }) {
   const state = robot.state.value;
-  const { received, missing, stale } = robot.readout.value;
+  const { stale } = robot.readout.value;
   const { status, clock } = state;
-  const lag = Math.max(0, state.next_seq - state.durable_next_seq);
-  const lost = status?.lost_samples ?? 0;
   const fill = status && state.ring_capacity > 0 ? status.ring_fill / state.ring_capacity : null;
   return (
     <section class={`link-panel ${stale ? 'stale' : ''}`} aria-label="Link and health">
@@ -21,35 +22,9 @@ export function LinkPanel({ robot }: { robot: Robot }) {
           value={milliseconds_of_us(clock?.uncertainty_us, 2)}
           title="Uncertainty of the robot's clock against the station's"
         />
-        <Figure
-          name="Shown here"
-          unit=""
-          value={count(received)}
-          tone="on-desk-only"
-          title="Samples that this page has received"
-        />
-        <Figure
-          name="Missed here"
-          unit=""
-          value={count(missing)}
-          tone={missing > 0 ? 'caution' : ''}
-          title="Samples that this page has not received; the recording has its own count"
-        />
-        <Figure
-          name="Lost for good"
-          unit=""
-          value={count(lost)}
-          tone={lost > 0 ? 'alarm' : ''}
-          title="Overwritten on the robot before the station had them on disk"
-        />
-        <Figure
-          name="Not yet on disk"
-          unit=""
-          value={count(lag)}
-          tone={lag > 200 ? 'caution' : ''}
-          title="Samples received but not yet durable"
-        />
       </dl>
+      <h2>Recording</h2>
+      <RecordingFigures robot={robot} is_current={is_current} />
       <h2>Robot</h2>
       {changed_limits_of(state) && <p id="changed-limits">{changed_limits_of(state)}</p>}
       <dl>
@@ -70,6 +45,55 @@ export function LinkPanel({ robot }: { robot: Robot }) {
         />
       </dl>
     </section>
+  );
+}
+
+function RecordingFigures({ robot, is_current }: { robot: Robot; is_current: boolean }) {
+  const open = useSignal(false);
+  const state = robot.state.value;
+  const { received, missing } = robot.readout.value;
+  const line = recording_line(state, missing, is_current);
+  const lost = state.status?.lost_samples ?? 0;
+  const lag = Math.max(0, state.next_seq - state.durable_next_seq);
+  return (
+    <div class="recording-figures">
+      <button
+        type="button"
+        id="recording-line"
+        class={line.tone}
+        aria-expanded={open.value}
+        aria-controls="recording-details"
+        onClick={() => (open.value = !open.value)}
+      >
+        {line.text}
+      </button>
+      {open.value && (
+        <dl id="recording-details">
+          <Figure name="Shown here" unit="" value={count(received)} title="Samples that this page has received" />
+          <Figure
+            name="Missed here"
+            unit=""
+            value={count(missing)}
+            tone={missing > 0 ? 'caution' : ''}
+            title="Samples that this page has not received; the recording has its own count"
+          />
+          <Figure
+            name="Lost for good"
+            unit=""
+            value={count(lost)}
+            tone={lost > 0 ? 'alarm' : ''}
+            title="Overwritten on the robot before the station had them on disk"
+          />
+          <Figure
+            name="Not yet on disk"
+            unit=""
+            value={count(lag)}
+            tone={lag > 200 ? 'caution' : ''}
+            title="Samples received but not yet durable"
+          />
+        </dl>
+      )}
+    </div>
   );
 }
 

@@ -4,6 +4,7 @@ import { useSignal } from '@preact/signals';
 import { percent, percent_to_duty } from '../format';
 import type { Session } from '../session';
 import type { Robot } from '../robot';
+import { GamepadLine } from './gamepad_line';
 import { HeldButton } from './hold_button';
 import { OutcomeLine, useAsking } from './request';
 
@@ -75,6 +76,12 @@ export function ManualControl({ session, robot }: { session: Session; robot: Rob
           Zero position
         </button>
       </div>
+      <GamepadLine
+        session={session}
+        robot_id={robot_id}
+        why_not={possible ? '' : connected && !in_manual ? 'it acts in manual.' : 'the robot cannot be driven now.'}
+        full_duty={percent_to_duty(duty_percent.value)}
+      />
       {(held.error || held.lapsed) && (
         <p class="outcome failed" id="hold-outcome" role="alert">
           {held.error || 'The link was too slow to keep the motor running. Let go, then press again.'}

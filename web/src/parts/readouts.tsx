@@ -1,18 +1,28 @@
-// The large numerals, and a scale that shows position, reference and setpoint as one glance.
+// The large numerals.
 //
 // Two positions stand side by side, always: where the robot believes that it is, and what its controller sees, which a
 // disturbance moves away from that. Each has its "±" and its own distance to the setpoint.
 
 import { age, millimetres, millimetres_per_s, millivolts, percent, plus_minus } from '../format';
 import type { Robot } from '../robot';
-import { Tape } from './tape';
+import type { Channel } from '../thresholds';
+import { alerts_of } from './threshold_list';
 
 export function Readouts({ robot }: { robot: Robot }) {
   const now = robot.readout.value;
+  const beyond = (channel: Channel) =>
+    !now.stale && alerts_of(robot).alerts.value.some((alert) => alert.channel === channel && alert.is_beyond);
   const silent = Number.isFinite(now.sample_age_ms) ? `no sample for ${age(now.sample_age_ms)}` : 'no sample yet';
   return (
     <section class={`readouts ${now.stale ? 'stale' : ''}`} aria-label="Measured now">
-      <Numeral name="Position, estimated" unit="mm" value={millimetres(now.estimate_m)} kind="main" id="position">
+      <Numeral
+        name="Position, estimated"
+        unit="mm"
+        value={millimetres(now.estimate_m)}
+        kind="main"
+        id="position"
+        is_beyond={beyond('estimate_m')}
+      >
         <span>
           {plus_minus(now.position_sd_m)} mm (2 sd){now.model && `, ${now.model}`}
         </span>
@@ -31,14 +41,27 @@ export function Readouts({ robot }: { robot: Robot }) {
       <Numeral name="Setpoint" unit="mm" value={millimetres(now.setpoint_m)} kind="setpoint" id="setpoint">
         {now.setpoint_m === null ? 'none in force' : ''}
       </Numeral>
-      <Numeral name="Duty" unit="%" value={percent(now.duty)} kind="duty" id="duty">
+      <Numeral name="Duty" unit="%" value={percent(now.duty)} kind="duty" id="duty" is_beyond={beyond('duty')}>
         <DutyBar duty={now.duty} />
       </Numeral>
       <div class="numeral-pair">
-        <Numeral name="Velocity" unit="mm/s" value={millimetres_per_s(now.velocity_m_s)} kind="small" id="velocity" />
-        <Numeral name="Impedance" unit="mV" value={millivolts(now.impedance_mv)} kind="small" id="impedance" />
+        <Numeral
+          name="Velocity"
+          unit="mm/s"
+          value={millimetres_per_s(now.velocity_m_s)}
+          kind="small"
+          id="velocity"
+          is_beyond={beyond('velocity_m_s')}
+        />
+        <Numeral
+          name="Impedance"
+          unit="mV"
+          value={millivolts(now.impedance_mv)}
+          kind="small"
+          id="impedance"
+          is_beyond={beyond('impedance_mv')}
+        />
       </div>
-      <Tape robot={robot} />
     </section>
   );
 }
@@ -52,12 +75,13 @@ interface NumeralProps {
   value: string;
   id: string;
   kind?: 'main' | 'seen' | 'setpoint' | 'duty' | 'small';
+  is_beyond?: boolean; // a threshold of this browser
   children?: preact.ComponentChildren;
 }
 
-function Numeral({ name, unit, value, id, kind, children }: NumeralProps) {
+function Numeral({ name, unit, value, id, kind, is_beyond = false, children }: NumeralProps) {
   return (
-    <div class={`numeral ${kind ?? ''}`} id={`numeral-${id}`}>
+    <div class={`numeral ${kind ?? ''} ${is_beyond ? 'beyond' : ''}`} id={`numeral-${id}`}>
       <span class="label">{name}</span>
       <span class="value">
         <output>{value}</output>

@@ -10,6 +10,8 @@ import { Plots } from '../parts/plots';
 import { Readouts } from '../parts/readouts';
 import { RobotList } from '../parts/robot_list';
 import { RunControl } from '../parts/run_control';
+import { AlertLine } from '../parts/threshold_list';
+import { Vessel } from '../parts/vessel';
 import { Waiting } from '../parts/waiting';
 import type { Session } from '../session';
 import type { ViewProps } from './table';
@@ -22,7 +24,7 @@ export default function RobotView({ session, route }: ViewProps) {
     <>
       <aside class="side" aria-label="Robots and link">
         <RobotList session={session} />
-        {robot && !is_other && <LinkPanel robot={robot} />}
+        {robot && !is_other && <LinkPanel robot={robot} is_current={session.store.is_current.value} />}
       </aside>
       <main class="scope" aria-label={robot ? `Robot ${robot.robot_id}` : 'No robot'}>
         {is_other ? (
@@ -30,8 +32,10 @@ export default function RobotView({ session, route }: ViewProps) {
         ) : robot ? (
           <>
             <ModeAnnunciator robot={robot} is_current={session.store.is_current.value} />
+            <AlertLine session={session} robot={robot} />
             <Readouts robot={robot} />
-            <Plots robot={robot} />
+            <Vessel session={session} robot={robot} />
+            <Plots session={session} robot={robot} />
           </>
         ) : (
           <Waiting session={session} />

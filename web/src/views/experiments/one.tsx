@@ -14,7 +14,6 @@ import { KnowledgePanel } from './knowledge';
 import type { Track } from './preview';
 import { RunsTable } from './runs_table';
 import { moment_text } from './slot_time';
-import { PlotWindow } from '../../samples';
 import { TrackPlot, type Measured } from './track_plot';
 import { how_long, kStates, progress_text, sentence_of, situation, who } from './words';
 
@@ -231,19 +230,20 @@ function track_of_prediction(prediction: Prediction | null): Track | null {
   return { t_s, position_m, duty, setpoint_m, position_sd_m };
 }
 
-const kCapacity = 8192;
-
 // Where the robot believed that it was since the run began, as far as this page has received it.
 function useMeasured(robot: Robot | undefined, elapsed_s: number | null): Measured | null {
-  const window = useMemo(() => new PlotWindow(kCapacity, ['estimate_m'], 0), []);
   return useMemo(() => {
     if (!robot || elapsed_s === null) return null;
-    window.fill(robot.ring, performance.now() / 1000, elapsed_s);
+    const { ring } = robot;
+    const began_s = performance.now() / 1000 - elapsed_s;
     const t_s: number[] = [];
     const position_m: number[] = [];
-    for (let i = 0; i < window.size; ++i) {
-      t_s.push((window.time_s[i] ?? 0) + elapsed_s);
-      position_m.push(window.values[0]?.[i] ?? NaN);
+    for (let index = ring.first_index; index < ring.next_index; ++index) {
+      const slot = index % ring.capacity;
+      const since_s = (ring.time_s[slot] ?? NaN) - began_s;
+      if (!ring.holds(index) || !(since_s >= 0 && since_s <= elapsed_s)) continue;
+      t_s.push(since_s);
+      position_m.push(ring.columns.estimate_m[slot] ?? NaN);
     }
     return { t_s, position_m };
   }, [robot, elapsed_s]);

@@ -2,7 +2,7 @@
 
 import { useEffect, useRef } from 'preact/hooks';
 import uPlot from 'uplot';
-import { next_range, range_splits } from '../../chart';
+import { next_range, range_splits } from '../../range';
 import { kSpread_sd, millimetres, percent } from '../../format';
 import type { Track } from './preview';
 

@@ -5,7 +5,7 @@ import { useEffect, useRef } from 'preact/hooks';
 import { count, millimetres, millivolts, words } from '../../format';
 import { change_query, type Route } from '../../route';
 import { Choice } from '../../parts/choice';
-import { range_splits } from '../../chart';
+import { range_splits } from '../../range';
 import { RunPlot, type PlotOptions } from './run_plot';
 import { said } from './run_page';
 import type { ImpedanceBins, ImpedanceMap, RunsApi } from './runs_api';

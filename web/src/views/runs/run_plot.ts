@@ -3,7 +3,7 @@
 // Plots of one group share cursor and window. A row's gap is a null. Lines across the plot are moments, drawn below traces.
 
 import uPlot from 'uplot';
-import { next_range, range_splits } from '../../chart';
+import { next_range, range_splits } from '../../range';
 import type { Values } from './traces';
 
 export interface PlotTrace {

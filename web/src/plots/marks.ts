@@ -1,0 +1,116 @@
+// What stands on the time axis beside the samples: markers, events and commands as moments, runs as stretches.
+
+import type { CommandRecord, EventRecord, MarkerRecord, RunRecord } from '../api';
+import { describe } from '../parts/log_strip';
+import type { LogLine } from '../store';
+
+export interface Mark {
+  key: string;
+  at_s: number; // UTC
+  kind: 'marker' | 'event' | 'command';
+  tone: string; // '', 'caution' or 'alarm'
+  text: string;
+}
+
+export interface RunStretch {
+  run_id: number;
+  from_s: number;
+  to_s: number | null; // null: it is open
+  text: string;
+}
+
+const kMost = 4000; // the oldest are dropped
+
+export class Marks {
+  runs: RunStretch[] = [];
+  private moments: Mark[] = []; // by time
+  private readonly by_key = new Map<string, Mark>();
+
+  get all(): readonly Mark[] {
+    return this.moments;
+  }
+
+  take_events(events: EventRecord[]): void {
+    this.put(events.map((event) => mark_of(line_of({ event }), event.received_at_us)));
+  }
+
+  take_commands(commands: CommandRecord[]): void {
+    const shown = commands.filter(({ kind }) => kind !== 'renew_lease'); // several a second while a duty is held
+    this.put(shown.map((command) => mark_of(line_of({ command }), command.submitted_at_us)));
+  }
+
+  // What has happened since; `lines` are of every robot, and of the page.
+  take_log(lines: readonly LogLine[], robot_id: string): void {
+    const ours = lines.filter((line) => line.robot_id === robot_id && line.note === null);
+    this.put(ours.map((line) => mark_of(line, line.at_ms * 1000)));
+  }
+
+  take_markers(markers: MarkerRecord[]): void {
+    this.put(
+      markers.map(({ marker_id, utc_us, made_at_us, text }) => ({
+        key: `marker-${marker_id}`,
+        at_s: (utc_us ?? made_at_us) / 1e6,
+        kind: 'marker',
+        tone: '',
+        text: text || 'marker',
+      })),
+    );
+  }
+
+  set_runs(runs: RunRecord[]): void {
+    this.runs = runs.map(({ run_id, name, started_at_us, ended_at_us }) => ({
+      run_id,
+      from_s: started_at_us / 1e6,
+      to_s: ended_at_us === null ? null : ended_at_us / 1e6,
+      text: name || `run ${run_id}`,
+    }));
+  }
+
+  within(from_s: number, to_s: number): Mark[] {
+    return this.moments.slice(this.first_from(from_s), this.first_from(to_s));
+  }
+
+  // The one next to a time, if there is one so near.
+  near(at_s: number, reach_s: number): Mark | null {
+    let best: Mark | null = null;
+    for (const mark of this.within(at_s - reach_s, at_s + reach_s)) {
+      if (!best || Math.abs(mark.at_s - at_s) < Math.abs(best.at_s - at_s)) best = mark;
+    }
+    return best;
+  }
+
+  private first_from(at_s: number): number {
+    let [low, high] = [0, this.moments.length];
+    while (low < high) {
+      const middle = (low + high) >> 1;
+      if ((this.moments[middle] as Mark).at_s < at_s) low = middle + 1;
+      else high = middle;
+    }
+    return low;
+  }
+
+  private put(marks: Mark[]): void {
+    if (marks.length === 0) return;
+    for (const mark of marks) this.by_key.set(mark.key, mark);
+    const sorted = [...this.by_key.values()].sort((a, b) => a.at_s - b.at_s);
+    for (const mark of sorted.slice(0, Math.max(0, sorted.length - kMost))) this.by_key.delete(mark.key);
+    this.moments = sorted.slice(-kMost);
+  }
+}
+
+const line_of = (what: { event?: EventRecord; command?: CommandRecord }): LogLine => ({
+  key: what.command
+    ? `command-${what.command.command_id}`
+    : `event-${what.event?.robot_id}-${what.event?.boot_id ?? ''}-${what.event?.event_seq ?? ''}-${what.event?.received_at_us}`,
+  at_ms: 0,
+  robot_id: '',
+  event: what.event ?? null,
+  command: what.command ?? null,
+  note: null,
+  position_sd_m: null,
+});
+
+function mark_of(line: LogLine, at_us: number): Mark {
+  const [tone, , text] = describe(line);
+  return { key: line.key, at_s: at_us / 1e6, kind: line.command ? 'command' : 'event', tone, text };
+}

@@ -1,0 +1,107 @@
+// Above the plots: back to live, how much time they show, of which clock, and which traces.
+
+import { useSignal, type Signal } from '@preact/signals';
+import { useCloseOnEscape } from '../keys';
+import { kStrips, type PlotSettings } from './strips';
+
+const kSpans = [
+  { span_s: 60, text: '1 min' },
+  { span_s: 600, text: '10 min' },
+  { span_s: 3600, text: '1 h' },
+  { span_s: 21_600, text: '6 h' },
+  { span_s: 86_400, text: '1 day' },
+];
+
+export interface PlotState {
+  is_live: boolean;
+  span_s: number;
+  range: string; // what is held, in words
+}
+
+interface BarProps {
+  state: Signal<PlotState>;
+  note: Signal<string>;
+  settings: PlotSettings;
+  on_live(): void;
+  on_span(span_s: number): void;
+  children?: preact.ComponentChildren;
+}
+
+export function PlotBar({ state, note, settings, on_live, on_span, children }: BarProps) {
+  const { is_live, span_s, range } = state.value;
+  const { is_utc } = settings.kept.value;
+  return (
+    <div class="plot-bar">
+      <button type="button" id="plots-live" class={is_live ? 'live' : 'held'} aria-pressed={is_live} onClick={on_live}>
+        {is_live ? 'Live' : 'Back to live'}
+      </button>
+      <div class="spans" role="group" aria-label="How much time the plots show">
+        {kSpans.map((span) => (
+          <button
+            type="button"
+            key={span.span_s}
+            aria-pressed={Math.abs(span_s - span.span_s) < 0.5}
+            onClick={() => on_span(span.span_s)}
+          >
+            {span.text}
+          </button>
+        ))}
+      </div>
+      <output class="range" id="plots-range">
+        {range}
+      </output>
+      <output class="plot-note" id="plots-note">
+        {note}
+      </output>
+      <button
+        type="button"
+        id="plots-clock"
+        title="The clock of the time axis"
+        onClick={() => settings.change({ is_utc: !is_utc })}
+      >
+        {is_utc ? 'UTC' : 'Local time'}
+      </button>
+      {children}
+      <TraceList settings={settings} />
+    </div>
+  );
+}
+
+function TraceList({ settings }: { settings: PlotSettings }) {
+  const open = useSignal(false);
+  useCloseOnEscape(() => (open.value = false));
+  const { traces } = settings.kept.value;
+  return (
+    <div class="trace-choice">
+      <button
+        type="button"
+        id="plots-traces"
+        aria-expanded={open.value}
+        aria-controls="trace-list"
+        onClick={() => (open.value = !open.value)}
+      >
+        Traces
+      </button>
+      {open.value && (
+        <fieldset id="trace-list">
+          <legend>Traces, kept in this browser</legend>
+          {kStrips.flatMap((strip) =>
+            [...strip.traces].reverse().map(({ name, text, swatch }) => (
+              <label key={name}>
+                <input
+                  type="checkbox"
+                  autoComplete="off"
+                  name={name}
+                  checked={traces.includes(name)}
+                  disabled={traces.length === 1 && traces[0] === name}
+                  onChange={() => settings.toggle(name)}
+                />
+                <span class={`swatch ${swatch}`}>{strip.traces.length > 1 ? `${strip.title}, ${text}` : text}</span>
+              </label>
+            )),
+          )}
+        </fieldset>
+      )}
+    </div>
+  );
+}
