@@ -81,6 +81,7 @@ export class Store {
         break;
       case 'experiment': // shown by what it does to the robot
       case 'stamp':
+      case 'echo':
         break;
     }
   }
