@@ -60,6 +60,7 @@ const robot = (robot_id: string, seq: number): RobotState => ({
   control: null,
   reservation: null,
   pending_stop: null,
+  stop_path: { is_open: true, round_trip_us: 1900, answered_at_us: 0 },
   fluid: null,
   model: { state: 'assumed', fluid: null, reason: '', fit_error: null, set_at_us: null },
   retired: false,

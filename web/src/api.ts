@@ -5,14 +5,12 @@
 import type { components } from './api_types';
 import { millimetres, percent } from './format';
 import { kReasons } from './reasons';
-import type { Stamp } from './station_path';
 import { outcome_of, type StopOutcome } from './stop_outcome';
-import type { RobotStopPath } from './stop_path';
 
 type Schemas = components['schemas'];
 export type Fluid = Schemas['Fluid'];
 export type RobotModel = Schemas['RobotModel'];
-export type RobotState = Schemas['Robot'] & { retired?: boolean; stop_path?: RobotStopPath };
+export type RobotState = Schemas['Robot'] & { retired?: boolean };
 export type CommandRecord = Schemas['Command'];
 export type CommandBody = Schemas['CommandBody'];
 export type Control = Schemas['Control'];
@@ -31,11 +29,8 @@ export type Token = Schemas['Token'];
 export type PageSession = Schemas['PageSession'];
 export type Enrolment = Schemas['Enrolment'] & { retired_at_us?: number | null; retired_by?: string };
 export type SamplesMessage = Schemas['LiveSamples'];
-export type LiveMessage =
-  | Exclude<Schemas['LiveServerMessage'], { type: 'stamp' } | { type: 'welcome' }>
-  | (Schemas['LiveStamp'] & Stamp)
-  | (Schemas['LiveWelcome'] & { echoes?: boolean });
-export type ClientMessage = Schemas['LiveClientMessage'] | { type: 'echo'; stamp_us: number };
+export type LiveMessage = Schemas['LiveServerMessage'];
+export type ClientMessage = Schemas['LiveClientMessage'];
 type Problem = Schemas['Problem'];
 
 // What the station says of a stop of every robot; one of an older version says only what became of each command.

@@ -113,8 +113,11 @@ export class Robot {
   readonly emergency_id = computed(() => this.state.value.emergency_id);
   // Connected, and its samples do not come.
   readonly is_silent = computed(() => !this.is_away.value && this.readout.value.watched && this.readout.value.stale);
-  // Connected, and its own way for a stop is not open. Of a station that does not measure it nothing is said.
-  readonly is_unstoppable = computed(() => !this.is_away.value && this.state.value.stop_path?.is_open === false);
+  // Connected, and its own way for a stop is not open. Of one that is not measured, or not yet, nothing is said.
+  readonly is_unstoppable = computed(() => {
+    const path = this.state.value.stop_path;
+    return !this.is_away.value && path?.is_open === false && path.round_trip_us !== null;
+  });
   private latest: SamplesMessage | null = null;
   private sampled_at_ms = -Infinity;
   private watched = true; // its samples are asked for

@@ -173,6 +173,7 @@ export class Session {
   private measure(message: LiveMessage): void {
     const now_ms = performance.now();
     if (message.type === 'welcome') this.path.begin(message, now_ms);
+    else if (message.type === 'echo') this.path.receive_echo(message.stamp_us, now_ms);
     else if (message.type !== 'stamp') return;
     else if (this.path.receive(message, now_ms) && this.link.send({ type: 'echo', stamp_us: message.stamp_us }))
       this.path.echoed(message.stamp_us, now_ms);

@@ -33,13 +33,17 @@ export class StopPath {
   look = (): void => {
     const now_ms = this.ways.now_ms();
     this.hindrance.value = this.judge(now_ms);
-    this.wait(this.hindrance.value === null ? this.path.heard_until_ms : Infinity, now_ms);
+    this.wait(this.hindrance.value === null ? this.next_ms : Infinity, now_ms);
   };
+
+  private get next_ms(): number {
+    return Math.min(this.path.heard_until_ms, this.path.received_until_ms);
+  }
 
   private judge(now_ms: number): Hindrance {
     if (!this.ways.is_live()) return 'cut_off';
     if (now_ms >= this.path.heard_until_ms) return 'silent';
-    return this.path.is_received ? null : 'unanswered';
+    return now_ms >= this.path.received_until_ms ? 'unanswered' : null;
   }
 
   private wait(until_ms: number, now_ms: number): void {
@@ -56,13 +60,6 @@ export class StopPath {
   }
 }
 
-// What the station says of the stop's own way to a robot; a station of an older version says nothing.
-export interface RobotStopPath {
-  is_open: boolean;
-  round_trip_us: number | null;
-  answered_at_us: number | null; // UTC
-}
-
 export interface Readiness {
   works: boolean; // as far as is known
   text: string; // when it would not work: what becomes of a press
@@ -77,7 +74,7 @@ export function readiness_of(
   page_ms: number | null,
   robot: Pick<RobotState, 'robot_id' | 'link' | 'stop_path'> | null,
 ): Readiness {
-  const path = robot?.stop_path;
+  const path = robot?.stop_path ?? null; // null: not measured
   const robot_ms = path && path.round_trip_us !== null ? path.round_trip_us / 1000 : null;
   const is_connected = robot?.link === 'connected';
   const parts = [

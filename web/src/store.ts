@@ -87,6 +87,7 @@ export class Store {
         this.experiments.take(message.experiment);
         break;
       case 'stamp':
+      case 'echo':
         break;
     }
   }

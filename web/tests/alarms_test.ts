@@ -57,8 +57,14 @@ test('an emergency is said with its cause, and stands first', () => {
 });
 
 test('a robot whose own way for a stop is shut is an alarm; one that is not measured is none', () => {
-  const shut = { is_open: false, round_trip_us: null, answered_at_us: null };
-  expect(page_with(state('a', { stop_path: shut }), state('b')).keys.value).toEqual(['stop_path a']);
+  const shut = { is_open: false, round_trip_us: 1800, answered_at_us: 1 };
+  const not_yet = { is_open: false, round_trip_us: null, answered_at_us: null };
+  const { keys } = page_with(
+    state('a', { stop_path: shut }),
+    state('b', { stop_path: null }),
+    state('c', { stop_path: not_yet }),
+  );
+  expect(keys.value).toEqual(['stop_path a']);
 });
 
 test('a page that is cut off says that, and of robots only what does not pass', () => {

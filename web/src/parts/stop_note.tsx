@@ -25,8 +25,8 @@ export function StopNote({ why, parts }: { why: string; parts: string }) {
           robot’s power switch within reach.
         </p>
         <p>
-          The way is measured all the time: the station answers this page ten times a second, and asks the robot twice a
-          second, as a stop would. {why || parts}.
+          The way is measured all the time: the station answers this page five times a second, and asks the robot twice
+          a second, as a stop would. {why || parts}.
         </p>
         <p>
           When a stop would not work now the button is hatched and says what becomes of a press. It can be pressed all

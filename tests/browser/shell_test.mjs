@@ -1,0 +1,206 @@
+// What is the same in every view: addresses, the stop and what it says of its own way, the frame of a page that is cut
+// off, every width, and accessibility by axe-core.
+import assert from 'node:assert/strict';
+import { readFileSync } from 'node:fs';
+import { Bench, run, until } from './programs.mjs';
+
+const kRobot = 'sim-1';
+const kViews = ['fleet', 'robot', 'station'];
+const kSizes = [[1440, 900], [1280, 800], [1024, 768], [768, 1024], [390, 844], [844, 390]];
+const kAxe = readFileSync(new URL('../../web/node_modules/axe-core/axe.min.js', import.meta.url), 'utf8');
+const bench = new Bench();
+const faults = [];
+let page;
+
+const text = (selector) => page.locator(selector).first().innerText();
+const works = () => page.locator('#emergency-stop').getAttribute('data-works');
+const address = () => page.evaluate(() => location.hash);
+const shown = {
+  fleet: () => page.locator('#fleet-list li').first().waitFor(),
+  robot: () => page.locator('.annunciator h1').getByText(kRobot).waitFor(),
+  station: () => page.locator('#storage').waitFor(),
+};
+const ready = () => until('a stop would work', async () => (await works()) === 'true');
+const drawn = () => page.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done))));
+
+// In the page: when the button was first seen not to work, by the page's own clock.
+const note_when_hindered = () =>
+  page.evaluate(() => {
+    window.hindered_at_ms = null;
+    const button = document.querySelector('#emergency-stop');
+    new MutationObserver(() => {
+      if (button.dataset.works === 'false') window.hindered_at_ms ??= performance.timeOrigin + performance.now();
+    }).observe(button, { attributes: true });
+  });
+const hindered_at_ms = () => until('the button does not look as if it worked', () => page.evaluate(() => window.hindered_at_ms));
+
+const steps = {
+  async 'each view is reached by its link, its keys and its address, and "back" leads back'() {
+    bench.start_robot(kRobot);
+    await page.goto(await bench.login_link());
+    await shown.robot();
+    await until('the robot stands in the address', async () => (await address()) === `#/robot/${kRobot}`);
+    for (const view of kViews) {
+      await page.click(`#open-${view}`);
+      await shown[view]();
+      assert.equal(await page.locator('.views [aria-current=page]').getAttribute('id'), `open-${view}`);
+    }
+    await page.goBack();
+    await shown.robot();
+    await page.goBack();
+    await shown.fleet();
+    for (const [key, view] of [['s', 'station'], ['r', 'robot'], ['f', 'fleet']]) {
+      await page.keyboard.press('g');
+      await page.keyboard.press(key);
+      await shown[view]();
+    }
+    await page.fill('#fleet-search', 'gs');
+    assert.match(await address(), /^#\/fleet\?search=gs$/, 'letters in a field are text');
+    await page.locator('#none-listed').waitFor();
+    await page.reload();
+    await page.locator('#none-listed').waitFor();
+    assert.equal(await page.inputValue('#fleet-search'), 'gs', 'an address leads back to what was looked at');
+    await page.click('#none-listed button');
+    await page.click(`#fleet-list li[data-robot="${kRobot}"] a`);
+    await shown.robot();
+  },
+
+  async 'an address of nothing, and of no robot, says so'() {
+    await page.goto(`${bench.http}/#/nowhere`);
+    await page.locator('#no-such-view').waitFor();
+    await page.locator('#no-such-view a').first().click();
+    await shown.fleet();
+    await page.goto(`${bench.http}/#/robot/nobody`);
+    await page.getByText('The station knows no robot “nobody”').waitFor();
+    assert.match(await text('#emergency-stop .whom'), /stops sim-1/, 'the stop keeps its robot');
+    await page.click('#open-robot');
+    await shown.robot();
+  },
+
+  async 'the stop shows how long its way is'() {
+    await ready();
+    await until('both parts are measured', async () => /^path \d+(\.\d)? ms$/.test(await text('#stop-path')));
+    await until('and the status line the ways and the age', async () =>
+      /ms$/.test(await text('#page-round-trip')) && /ms$/.test(await text('#robot-round-trip')) && /ms old$/.test(await text('#seen-age')));
+    await page.click('#show-stop-note');
+    assert.match(await text('#stop-note'), /does not replace a device that cuts the power/);
+    await page.click('#show-stop-note');
+  },
+
+  async 'a station that stands still is shown in time, on every view, and so is that it goes on'() {
+    for (const view of kViews) {
+      await page.click(`#open-${view}`);
+      await shown[view]();
+      await ready();
+      await note_when_hindered();
+      const stopped_at_ms = Date.now();
+      bench.station.process.kill('SIGSTOP');
+      const after_ms = (await hindered_at_ms()) - stopped_at_ms;
+      console.log(`    ${view}: ${Math.round(after_ms)} ms after SIGSTOP`);
+      assert.equal(await text('#stop-path'), 'will be sent when the station answers');
+      assert.ok(await page.locator('#emergency-stop').isEnabled(), 'it can be pressed');
+      // The bound is the page's; a machine that is busy with other things is given the time that it takes.
+      assert.ok(after_ms < 1000, `${after_ms} ms`);
+      bench.station.process.kill('SIGCONT');
+      await ready();
+    }
+  },
+
+  async 'a robot that stands still is shown, and its return'() {
+    await page.click('#open-robot');
+    await ready();
+    bench.robot.process.kill('SIGSTOP');
+    await until('the button says so', async () => /will be sent when sim-1/.test(await text('#stop-path')));
+    assert.equal(await works(), 'false');
+    bench.robot.process.kill('SIGCONT');
+    await ready();
+  },
+
+  async 'a killed station is a frame around the page, on every view, and it heals by itself'() {
+    await page.click('#open-fleet');
+    await shown.fleet();
+    await bench.station.end('SIGKILL');
+    for (const view of kViews) {
+      await page.click(`#open-${view}`);
+      await page.locator('#cut-off-frame').waitFor();
+      assert.match(await text('#status'), /Cut off from the station\s+since \d\d:\d\d:\d\d/);
+      assert.equal(await works(), 'false');
+    }
+    assert.equal(await page.title(), 'Cut off · Rheonaut');
+    await page.click('#open-robot');
+    await page.keyboard.press('Escape'); // kept by the page
+    await until('it is kept', async () => /goes again by itself/.test(await text('#stop-line')));
+    await bench.start_station();
+    await page.locator('#cut-off-frame').waitFor({ state: 'detached' });
+    await until('what was pressed has stopped the robot', async () => (await bench.ask(`/robots/${kRobot}`)).emergency_id !== null);
+    await ready();
+    await page.locator('#latch').waitFor();
+    assert.match(await text('#clear-emergency'), /^Hold 1 s to clear: operator, (before )?\d\d:\d\d:\d\d$/);
+  },
+
+  async 'a view that cannot be loaded comes by itself when the station is back'() {
+    const other = await page.context().newPage();
+    await other.goto(`${bench.http}/#/robot/${kRobot}`);
+    await other.locator('.annunciator h1').waitFor();
+    await bench.station.end('SIGKILL');
+    await other.locator('#cut-off-frame').waitFor();
+    await other.click('#open-fleet');
+    await other.locator('#not-loaded').waitFor();
+    assert.match(await other.locator('#not-loaded').innerText(), /tried again each second/);
+    await bench.start_station();
+    await other.locator('#fleet-list li').first().waitFor();
+    await until('two tabs know of each other', async () => (await other.locator('#other-tabs').count()) === 1);
+    await other.close();
+  },
+
+  async 'at every width the stop, the status and the alarms are in reach, and nothing is wider than the page'() {
+    for (const view of kViews) {
+      await page.click(`#open-${view}`);
+      await shown[view]();
+      for (const [width, height] of kSizes) {
+        await page.setViewportSize({ width, height });
+        await drawn();
+        const found = await page.evaluate(() => {
+          const reached = (selector) => {
+            const { left, top, width, height } = document.querySelector(selector).getBoundingClientRect();
+            return Boolean(document.elementFromPoint(left + width / 2, top + height / 2)?.closest(selector));
+          };
+          return {
+            wide: document.documentElement.scrollWidth - innerWidth,
+            out_of_reach: ['#emergency-stop', '#stop-all', '#show-alarms', '#seen-age'].filter((each) => !reached(each)),
+          };
+        });
+        assert.deepEqual(found, { wide: Math.min(0, found.wide), out_of_reach: [] }, `${view} at ${width} × ${height}`);
+      }
+      await page.setViewportSize({ width: 1440, height: 900 });
+    }
+  },
+
+  async 'axe finds nothing, in light and in dark'() {
+    for (const view of kViews) {
+      await page.click(`#open-${view}`);
+      await shown[view]();
+      for (const colorScheme of ['dark', 'light']) {
+        await page.emulateMedia({ colorScheme });
+        for (const [width, height] of [[1440, 900], [390, 844]]) {
+          await page.setViewportSize({ width, height });
+          await drawn();
+          await page.evaluate(kAxe);
+          const { violations } = await page.evaluate(() => window.axe.run(document, { resultTypes: ['violations'] }));
+          const found = violations.map(({ id, nodes }) => `${id}: ${nodes.slice(0, 4).map((node) => `${node.html.slice(0, 110)} ${node.any[0]?.message ?? ''}`).join(' | ')}`);
+          assert.deepEqual(found, [], `${view}, ${colorScheme}, ${width} × ${height}`);
+        }
+      }
+      await page.setViewportSize({ width: 1440, height: 900 });
+    }
+  },
+
+  async 'the page made no error of its own'() {
+    assert.deepEqual(faults, []);
+  },
+};
+
+await run(bench, steps, async () => {
+  page = await bench.open_browser({ viewport: { width: 1440, height: 900 }, colorScheme: 'dark' });
+  page.on('pageerror', (error) => faults.push(error.message));
+});
