@@ -168,9 +168,10 @@ export function Begin({ session, route }: ViewProps) {
   }
 
   function blocked_by(written: string, asked: string): string {
+    if (!store.is_current.value) return 'Cut off from the station: nothing can be begun.';
+    if (session.me.value === null) return 'Asking the station…';
     if (!may_command(session)) return 'Your role may look and stop. To begin needs the role operator.';
     if (robot === null) return 'Choose a robot.';
-    if (!store.is_current.value) return 'Cut off from the station: nothing can be begun.';
     if (written.trim() === '') return 'Choose a profile.';
     return asked === '' ? '' : 'Asking the station…';
   }

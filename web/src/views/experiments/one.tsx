@@ -206,9 +206,9 @@ function RunPlot({ session, experiment, summary }: RunPlotProps) {
         label={`Run ${number}: predicted from ${millimetres(answer.position_min_m ?? null, 0)} to ${millimetres(answer.position_max_m ?? null, 0)} mm`}
       />
       <p class="track-legend">
-        {measured && <span class="key measured">position, estimated</span>}{' '}
-        <span class="key predicted">predicted{has_band ? ' ± 2 sd' : ''}</span>{' '}
-        <span class="key setpoint">setpoint</span> <span class="key duty">duty, predicted</span>
+        {measured && <span class="track-key measured">position, estimated</span>}{' '}
+        <span class="track-key predicted">predicted{has_band ? ' ± 2 sd' : ''}</span>{' '}
+        <span class="track-key setpoint">setpoint</span> <span class="track-key duty">duty, predicted</span>
         <span class="quiet">
           {' '}
           On the model {answer.model_of}, stored before the run{has_band ? '' : '; how sure it is, is not known'}

@@ -6,7 +6,7 @@ import type { Controller, FluidsInForce } from '../../experiments_api';
 import { fluid_text, millimetres } from '../../format';
 import { model_for, type Plan as PlanOfRuns } from './outlook';
 import { kMostPreviewed, track_of, type RunPreview } from './preview';
-import { kTick_s, type Profile } from './profile';
+import { is_closed_loop, kTick_s, type Profile } from './profile';
 import { TrackPlot } from './track_plot';
 import { how_long } from './words';
 
@@ -27,6 +27,10 @@ export function Plan({ plan, fluid, fluids, controller, is_typed }: PlanProps) {
   if (!is_typed) return <p class="quiet empty">Choose a profile: what the robot is predicted to do is shown here.</p>;
   if (!plan.profile || !run || !track) {
     return <p class="quiet empty">There is no prediction while the text cannot be read.</p>;
+  }
+  // Without the control law nothing is known of the response: a robot at rest would be a false promise.
+  if (!controller && plan.profile.steps.some(({ kind }) => is_closed_loop(kind))) {
+    return <p class="quiet empty">There is no prediction: the controller of the robot is not known.</p>;
   }
   const is_grid = plan.runs.length > 1;
   const low = millimetres(run.position_min_m, 0);
@@ -50,14 +54,12 @@ export function Plan({ plan, fluid, fluids, controller, is_typed }: PlanProps) {
         step_begins_s={run.line.step_begins.map((tick) => tick * kTick_s)}
       />
       <p class="track-legend">
-        <span class="key predicted">predicted position</span> <span class="key setpoint">setpoint</span>{' '}
-        <span class="key duty">duty</span>
+        <span class="track-key predicted">predicted position</span> <span class="track-key setpoint">setpoint</span>{' '}
+        <span class="track-key duty">duty</span>
         <span class="quiet">
           {' '}
-          With {name}
-          {controller ? '' : ' and no controller: the robot has not reported its own'}; without noise, flow, or the
-          error of the estimate. With the run the station stores its own prediction, with a band where the model’s
-          uncertainty is known.
+          With {name}; without noise, flow, or the error of the estimate. With the run the station stores its own
+          prediction, with a band where the model’s uncertainty is known.
         </span>
       </p>
       {plan.problems.length > 0 && (
