@@ -111,8 +111,9 @@ function ThresholdRow({ channel }: { channel: Channel }) {
   const { title, unit, per_unit } = kShown[channel];
   const range = thresholds.ranges.value[channel] ?? { low: null, high: null };
   const problem = useSignal('');
+  const said = (value: number | null) => (value === null ? '' : String(Number((value / per_unit).toPrecision(9))));
+  const drafts = { low: useSignal(said(range.low)), high: useSignal(said(range.high)) }; // as it is being typed
   const field = (side: 'low' | 'high', word: string) => {
-    const value = range[side];
     return (
       <input
         autoComplete="off"
@@ -120,9 +121,10 @@ function ThresholdRow({ channel }: { channel: Channel }) {
         name={`${channel}-${side}`}
         aria-label={`${title} ${word}, in ${unit}`}
         aria-invalid={problem.value === side}
-        value={value === null ? '' : Number((value / per_unit).toPrecision(9))}
+        value={drafts[side].value}
         onInput={(event) => {
-          const wanted = parse_threshold(event.currentTarget.value, per_unit);
+          const text = (drafts[side].value = event.currentTarget.value);
+          const wanted = parse_threshold(text, per_unit);
           problem.value = wanted === undefined ? side : '';
           if (wanted !== undefined) thresholds.set(channel, { ...range, [side]: wanted });
         }}
