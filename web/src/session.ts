@@ -78,7 +78,7 @@ export class Session {
         if (message.type === 'problem') this.hold.lapse(); // the only message that it can be about, but for a stop
         this.store.receive(message);
         if (message.type === 'welcome') this.emergency.again();
-        // An echo of each stamp: what this page has set going needs a sign of life within 400 ms.
+        // With each stamp: what this page has set going needs a sign of life within 400 ms.
         if (message.type === 'stamp' && this.store.experiments.needs_sign_of_life(this.store.actor.peek()))
           this.keep_alive();
       },

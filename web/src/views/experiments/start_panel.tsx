@@ -95,6 +95,7 @@ export function StartPanel(props: StartPanelProps) {
         <label class="tick">
           <input
             type="checkbox"
+            autoComplete="off"
             id="unattended"
             checked={options.value.is_unattended}
             onChange={(event) => change({ is_unattended: event.currentTarget.checked })}
