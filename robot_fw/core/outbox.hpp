@@ -1,8 +1,8 @@
 // Decides what is sent next: the order of the messages, and how far each sequence has been sent.
 //
-// First to last: hello, acks of stops, answer to a stop probe, acks, requested parameters and controller, events, live samples, status,
-// heartbeat, what is in force (after a Welcome), backfill. Backfill: samples from before this connection
-// that the station lacks, or that it requests again; at most twice the rate of the live samples.
+// First to last: hello, acks of stops, answer to a stop probe, acks, requested parameters and controller, events, live
+// samples, status, heartbeat, what is in force (after a Welcome), backfill. Backfill: samples from before this
+// connection that the station lacks, or that it requests again; at most twice the rate of the live samples.
 #pragma once
 
 #include <array>

@@ -1,8 +1,8 @@
 // The frames to be sent to one robot: their order, and the unsent rest of a frame.
 //
-// First to last: Welcome, emergency stops, a stop probe, commands, a heartbeat when it is due or requested. Commands wait in a
-// bounded queue until the robot has a place for their answer (command_window.hpp), or until their validity has passed.
-// Times are steady µs. Pure, on the thread of its owner: no socket, no clock, no station.
+// First to last: Welcome, emergency stops, a stop probe, commands, a heartbeat when it is due or requested. Commands
+// wait in a bounded queue until the robot has a place for their answer (command_window.hpp), or until their validity
+// has passed. Times are steady µs. Pure, on the thread of its owner: no socket, no clock, no station.
 #pragma once
 
 #include <array>

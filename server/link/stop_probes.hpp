@@ -1,7 +1,7 @@
 // Whether an emergency stop would reach a robot now, and how fast: judged by probes that take the way of a stop.
 //
-// A probe is no command. One is due every 500 ms; the outbox sends it behind stops and ahead of all else. The way is open
-// while probes are answered and the robot is not silent. Times are steady µs. Pure, as its owner RobotOutbox.
+// A probe is no command. One is due every 500 ms; the outbox sends it behind stops and ahead of all else. The way is
+// open while probes are answered and the robot is not silent. Times are steady µs. Pure, as its owner RobotOutbox.
 #pragma once
 
 #include <algorithm>

@@ -151,7 +151,8 @@ std::size_t ReplayedRobot::next_frame(std::uint8_t* out, std::size_t capacity) {
   live_.next = std::max(live_.next, oldest_);
   backfill_.next = std::max(backfill_.next, oldest_);
   const bool is_greeted = phase_ == Phase::up && !hello_is_due_;
-  if (is_greeted && stop_probe_us_ == 0 && commands_.empty() && live_.next < live_.end) return write_telemetry(live_, false, out, capacity);
+  if (is_greeted && stop_probe_us_ == 0 && commands_.empty() && live_.next < live_.end)
+    return write_telemetry(live_, false, out, capacity);
   protocol::RobotFrame frame = rheonaut_RobotFrame_init_zero;
   frame.robot_time_us = robot_time_us();
   if (fill_small_frame(frame)) {

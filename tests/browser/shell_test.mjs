@@ -144,10 +144,12 @@ const steps = {
     await other.locator('.annunciator h1').waitFor();
     await bench.station.end('SIGKILL');
     await other.locator('#cut-off-frame').waitFor();
+    await other.route('**/*.js', (asked) => asked.abort()); // the browser may have kept the file of the view
     await other.click('#open-fleet');
     await other.locator('#not-loaded').waitFor();
     assert.match(await other.locator('#not-loaded').innerText(), /tried again each second/);
     await bench.start_station();
+    await other.unroute('**/*.js');
     await other.locator('#fleet-list li').first().waitFor();
     await until('two tabs know of each other', async () => (await other.locator('#other-tabs').count()) === 1);
     await other.close();

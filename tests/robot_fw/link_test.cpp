@@ -264,7 +264,8 @@ TEST_F(RobotLink, AStopProbeIsAnsweredInEachModeAndDoesNothing) {
     station.frames.clear();
     EXPECT_TRUE(station.send(probe));
     station.listen();  // within the tick in which it came
-    if (station.frames.empty() || station.frames[0].which_body != rheonaut_RobotFrame_stop_probe_answer_tag) return false;
+    if (station.frames.empty() || station.frames[0].which_body != rheonaut_RobotFrame_stop_probe_answer_tag)
+      return false;
     return station.frames[0].body.stop_probe_answer.echo_station_time_us == stamp_us;
   };
   EXPECT_TRUE(is_answered());

@@ -112,7 +112,7 @@ function Head({ session, hides, on_hides }: { session: Session; hides: boolean; 
     </button>
   );
   return (
-    <header class="view-head fleet-head">
+    <div class="view-head fleet-head">
       <h1>
         Fleet{' '}
         <small id="fleet-sum">
@@ -147,7 +147,7 @@ function Head({ session, hides, on_hides }: { session: Session; hides: boolean; 
           </button>
         )}
       </div>
-    </header>
+    </div>
   );
 }
 

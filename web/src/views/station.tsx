@@ -33,12 +33,12 @@ export default function StationView({ session }: ViewProps) {
   const is_admin = session.me.value?.role === 'admin';
   return (
     <>
-      <header class="view-head">
+      <div class="view-head">
         <h1>Station</h1>
         <p class="problem" role="alert">
           {problem.value}
         </p>
-      </header>
+      </div>
       <main class="view-body station-view" aria-label="Station">
         {station && <About station={station} />}
         {recording.value && <Storage recording={recording.value} />}
