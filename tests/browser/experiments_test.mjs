@@ -124,7 +124,7 @@ const steps = {
     await shows('done');
     const { runs } = await experiment(id); // a busy browser may miss 400 ms: its step is repeated then
     assert.ok(runs[0].steps.length >= 1);
-    assert.match(await page.locator('#experiment-runs').innerText(), /Done\s+run \d+/);
+    await until('its run is done', async () => /Done\s+run \d+/.test(await page.locator('#experiment-runs').innerText()));
     assert.equal(await page.locator('#experiment-runs a').getAttribute('href'), `#/runs/${runs[0].run_id}`);
     await fits('one that is done');
   },

@@ -112,7 +112,7 @@ function Head({ session, hides, on_hides }: { session: Session; hides: boolean; 
     </button>
   );
   return (
-    <div class="view-head fleet-head">
+    <section class="view-head fleet-head" aria-label="Filters of the fleet">
       <h1>
         Fleet{' '}
         <small id="fleet-sum">
@@ -147,7 +147,7 @@ function Head({ session, hides, on_hides }: { session: Session; hides: boolean; 
           </button>
         )}
       </div>
-    </div>
+    </section>
   );
 }
 

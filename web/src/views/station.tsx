@@ -33,12 +33,12 @@ export default function StationView({ session }: ViewProps) {
   const is_admin = session.me.value?.role === 'admin';
   return (
     <>
-      <div class="view-head">
+      <section class="view-head" aria-label="The station">
         <h1>Station</h1>
         <p class="problem" role="alert">
           {problem.value}
         </p>
-      </div>
+      </section>
       <main class="view-body station-view" aria-label="Station">
         {station && <About station={station} />}
         {recording.value && <Storage recording={recording.value} />}

@@ -1,13 +1,13 @@
 // To begin an experiment: choose or write a profile, see what it is predicted to do, look at what it waits for, start.
 
 import { signal, useSignal } from '@preact/signals';
-import { useEffect, useLayoutEffect, useMemo } from 'preact/hooks';
+import { useEffect, useLayoutEffect, useMemo, useRef } from 'preact/hooks';
 import { ApiError } from '../../api';
 import type { ProfileEntry } from '../../experiments_api';
 import { change_query, go_to } from '../../route';
 import type { Robot } from '../../robot';
 import type { ViewProps } from '../table';
-import { may_command, useActs, useAsked } from './acts';
+import { may_command, refusal, useActs, useAsked } from './acts';
 import { CheckList } from './check_list';
 import { checks_of } from './checks';
 import { Editor, type TextFault } from './editor';
@@ -50,14 +50,22 @@ export function Begin({ session, route }: ViewProps) {
   const options = useSignal(kOptions);
   const { pending, problem, act } = useActs();
 
-  const choose = (profile: string) =>
-    act('profile', async () => {
+  // What was chosen last is shown, however late an earlier choice is answered.
+  const chosen = useRef('');
+  const choose = async (profile: string) => {
+    chosen.current = profile;
+    try {
       const document = profile === kOwn ? kEmptyProfile : await session.experiments.profile(profile);
+      if (chosen.current !== profile) return;
       draft.value = { profile, original: document, text: document };
       station_fault.value = null;
       change_query({ profile });
-    });
+    } catch (error) {
+      if (chosen.current === profile) problem.value = refusal(error);
+    }
+  };
   useEffect(() => {
+    if (asked_profile !== '') chosen.current = asked_profile;
     if (asked_profile !== '' && asked_profile !== draft.peek().profile) void choose(asked_profile);
     else if (asked_profile === '' && draft.peek().profile !== '') change_query({ profile: draft.peek().profile });
   }, [asked_profile]);

@@ -63,15 +63,17 @@ export function Plan({ plan, fluid, fluids, controller, is_typed }: PlanProps) {
         </span>
       </p>
       {plan.problems.length > 0 && (
-        <ul class="plan-problems" id="plan-problems" role="status">
-          {plan.problems.slice(0, 6).map(({ run: number, text }) => (
-            <li key={`${number}-${text}`}>
-              {is_grid && <b>Run {number}: </b>}
-              {text}
-            </li>
-          ))}
-          {plan.problems.length > 6 && <li>…and {plan.problems.length - 6} more.</li>}
-        </ul>
+        <div class="plan-problems" id="plan-problems" role="status">
+          <ul>
+            {plan.problems.slice(0, 6).map(({ run: number, text }) => (
+              <li key={`${number}-${text}`}>
+                {is_grid && <b>Run {number}: </b>}
+                {text}
+              </li>
+            ))}
+            {plan.problems.length > 6 && <li>…and {plan.problems.length - 6} more.</li>}
+          </ul>
+        </div>
       )}
       {is_grid && (
         <Grid profile={plan.profile} runs={plan.runs} at={at} on_choose={(index) => (chosen.value = index)} />
