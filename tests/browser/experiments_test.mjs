@@ -173,7 +173,7 @@ const steps = {
       ids.push(await start());
       await shows('waiting');
     }
-    assert.match(await page.locator('#situation').innerText(), /Others are before it/);
+    await until('it waits for the others', async () => /Others are before it/.test(await page.locator('#situation').innerText()));
     await page.click('#tab-queue');
     const queue = page.locator(`#queue-${kRobot} .queue-list li`);
     const order = async () => Promise.all((await queue.all()).map((entry) => entry.getAttribute('data-experiment').then(Number)));
