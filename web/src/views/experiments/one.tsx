@@ -81,7 +81,7 @@ function StopNote({ session, robot_id, is_over }: { session: Session; robot_id: 
   const selected_id = store.selected_id.value;
   if (is_over || selected_id === robot_id || !store.find(robot_id)) return null;
   return (
-    <p class="stop-note" id="stop-note" role="alert">
+    <p class="stop-elsewhere" id="stop-elsewhere" role="alert">
       The stop button stops {selected_id ?? 'all robots'}; this experiment moves {robot_id}.{' '}
       <button type="button" onClick={() => store.select(robot_id)}>
         Let it stop {robot_id}
