@@ -24,7 +24,7 @@
 
 namespace server::analysis {
 
-inline constexpr std::int64_t kUsualBin_mm = 5, kNarrowestBin_mm = 1, kWidestBin_mm = 1000;
+inline constexpr std::int64_t kUsualBinMm = 5, kNarrowestBinMm = 1, kWidestBinMm = 1000;
 inline constexpr std::size_t kMaxImpedanceBins = 2'000;
 
 // Of the events that a map shows, and one more that shifts its positions.

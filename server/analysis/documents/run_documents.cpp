@@ -198,7 +198,7 @@ asio::awaitable<Result<std::string>> RunDocuments::comparison_report(RunIds ids,
   const Watch second_half = [watch](double share, const std::string& stage) {
     return !watch || watch(0.5 + 0.5 * share, "impedance of " + stage);
   };
-  auto maps = co_await impedance_maps(ids, 1e-3 * static_cast<double>(kUsualBin_mm), second_half);
+  auto maps = co_await impedance_maps(ids, 1e-3 * static_cast<double>(kUsualBinMm), second_half);
   if (!maps) co_return std::unexpected{maps.error()};
   if (maps->together.has_detections()) report.map = std::move(maps->together);
   for (const storage::RunId id : ids) {

@@ -250,7 +250,7 @@ Result<std::vector<storage::RunId>> query_runs(const http::Request& request, std
 
 Result<double> query_bin_m(const http::Request& request) {
   const auto bin_mm =
-      query_number(request, "bin_mm", analysis::kNarrowestBin_mm, analysis::kWidestBin_mm, analysis::kUsualBin_mm);
+      query_number(request, "bin_mm", analysis::kNarrowestBinMm, analysis::kWidestBinMm, analysis::kUsualBinMm);
   if (!bin_mm) return std::unexpected{bin_mm.error()};
   return 1e-3 * static_cast<double>(*bin_mm);
 }

@@ -78,7 +78,7 @@ void add_options(CLI::App& command, ImpedanceMapQuestion& options) {
       ->expected(1, 12)
       ->check(whole(1, std::numeric_limits<std::int64_t>::max()));
   command.add_option("--bin-mm", options.bin_mm, "Width of a bin of the position (default: 5)")
-      ->check(whole(analysis::kNarrowestBin_mm, analysis::kWidestBin_mm));
+      ->check(whole(analysis::kNarrowestBinMm, analysis::kWidestBinMm));
   command.add_option("--data", options.data_dir, "Folder of the station (default: rheonaut-data)")->check(named());
   add_json_and_csv_flags(command, options.form);
   command.footer("Example: rheonaut impedance-map 1 --bin-mm 10 --data lab");
