@@ -1,4 +1,4 @@
-// Sound and notification of a new alarm, for whoever looks elsewhere. Both are off until somebody turns them on.
+// Sound and notification of a new alarm, for a person who looks elsewhere. Both are off until somebody turns them on.
 
 import { effect, signal, type ReadonlySignal } from '@preact/signals';
 import type { Alarm } from './alarms';

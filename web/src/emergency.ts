@@ -64,7 +64,7 @@ export class EmergencyStop {
   }
 
   // The station is back: what it may never have received goes once more, under the same key, so that one press is one stop.
-  // Not a press of long ago: whoever made it has done something else since.
+  // Not a press of long ago: the person who made it has done something else since.
   again(): void {
     for (const press of [...this.kept.values()]) {
       const is_old = this.ways.now_ms() - press.pressed_at_ms > kKept_ms;

@@ -1,7 +1,7 @@
 // A manual duty by a gamepad: the left stick gives it, while a shoulder button is held, and no longer.
 //
 // The duty itself is held by DutyHold, as for the button on the page: this only says when a hand is on the control. It
-// looks at the pads once in each animation frame, since a browser tells what they do in no other way.
+// looks at the pads once in each animation frame, since a browser reports what they do in no other way.
 
 import type { DutyHold } from './duty_hold';
 

@@ -1,4 +1,4 @@
-// What the tab says to whoever looks elsewhere: the worst of all robots and of the connection, in title and icon.
+// What the tab says to a person who looks elsewhere: the worst of all robots and of the connection, in title and icon.
 //
 // It follows the states that the station reports, which reach a tab in the background at once; timers there are slow.
 

@@ -6,7 +6,7 @@ import type { Session } from '../session';
 import { GuardedButton } from './hold_button';
 import { OutcomeLine, useAsking } from './request';
 
-// SAFETY: only whoever is in control may clear, and only on a picture that is current; the station checks it again.
+// SAFETY: only the actor in control may clear, and only on a picture that is current; the station checks it again.
 export function may_clear(session: Session, robot: Robot): boolean {
   const { control, link } = robot.state.value;
   const me = session.me.value;

@@ -68,7 +68,7 @@ export function ActsOfOne({ session, experiment, acts }: ActsOfOneProps) {
   );
 }
 
-// Who is responsible, and what that asks of whoever looks at this page.
+// Who is responsible, and what that asks of the person who looks at this page.
 export function Presence({ session, experiment }: Omit<ActsOfOneProps, 'acts'>) {
   const me = session.store.actor.value;
   if (has_ended(experiment)) return null;

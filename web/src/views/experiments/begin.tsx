@@ -16,7 +16,7 @@ import { Plan } from './plan';
 import { kOptions, StartPanel } from './start_panel';
 import { how_long, place_of_refusal } from './words';
 
-// What is typed outlives the view: whoever looks at the robot meanwhile finds it again.
+// What is typed outlives the view: a person who looks at the robot meanwhile finds it again.
 const draft = signal({ profile: '', original: '', text: '' });
 const kOwn = 'own';
 const kTyping_ms = 150;

@@ -1,4 +1,4 @@
-// What the station would wait for before it begins, told before somebody presses Start: it decides, this only looks ahead.
+// What the station would wait for before it begins, shown before somebody presses Start: it decides, this only looks ahead.
 
 import type { RobotState, RunRecord } from '../../api';
 import { account_of, type Reservation } from '../../experiments_api';

@@ -6,7 +6,7 @@ import type { AskedRuns, Run } from './runs_api';
 
 const kPage = 100;
 const kSearchedPage = 500; // where this page looks for itself
-export const kScreen = 100; // rows that one call of more() adds at least, if there are so many
+export const kScreen = 100; // rows that one call of more() adds at least, if there are that many
 
 export class RunSearch {
   readonly found = signal<Run[]>([]);
