@@ -215,7 +215,9 @@ class Section5:
             return None
         if newest["ended_at_us"] is not None:
             raise Failed(f"experiment {newest['experiment_id']} is {newest['state']}: {newest['detail']}")
-        return newest if newest["state"] == "paused" else None
+        if newest["state"] != "paused":
+            return None
+        return self.station.get(f"/api/v1/experiments/{newest['experiment_id']}")  # with its runs; a list has none
 
     def judged(self, run, name, most_error_m):
         """Prints what the true position did, imports it as a reference, and notes what is beyond the bounds."""
