@@ -25,9 +25,10 @@ test('a model that does not fit stands out; its end does not', () => {
   expect(line({ kind: 'model_mismatch_ended' })[0]).toBe('');
 });
 
-test('a position has a ± only where one is known', () => {
+test('a position has a ±, or the line says that it is not known', () => {
   expect(line({ kind: 'mode_changed', mode: 'manual', position_m: 0.1 }, 0.002)[2]).toContain(
     'controller at 100.0 ± 4.0 mm',
   );
-  expect(line({ kind: 'position_zeroed', position_m: 0 })[2]).toContain('controller at 0.0 mm');
+  expect(line({ kind: 'time_step', position_m: 0.1 })[2]).toContain('controller at 100.0 mm, ± not known');
+  expect(line({ kind: 'position_zeroed', position_m: 0 })[2]).toMatch(/controller at 0.0 mm$/);
 });

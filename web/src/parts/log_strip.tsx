@@ -62,8 +62,10 @@ export function describe({ event, command, note, position_sd_m }: LogLine): [ton
       .map((said) => ` · ${words(said)}`)
       .join('');
     const detail = event.detail ? ` · ${event.detail}` : '';
-    const spread = position_sd_m === null ? '' : ` ${plus_minus(position_sd_m)}`;
-    const at = event.position_m !== null ? ` · controller at ${millimetres(event.position_m)}${spread} mm` : '';
+    const position = event.position_m === null ? '' : millimetres(event.position_m);
+    const unknown = event.kind === 'position_zeroed' ? ' mm' : ' mm, ± not known'; // zeroed: it is 0 by command
+    const spread = position_sd_m === null ? unknown : ` ${plus_minus(position_sd_m)} mm`;
+    const at = position && ` · controller at ${position}${spread}`;
     const way_out = kWaysOut[event.kind] ? ` · ${kWaysOut[event.kind]}` : '';
     const caution = /lost|fault|limit|lapsed|uncertain|mismatch$/.test(event.kind);
     return [
