@@ -33,7 +33,7 @@ control/tuning sim_robot/world sim_robot/robot sim_robot/network sim_robot/fault
 sim_robot/client sim_robot/fleet sim_robot/proxy sim_robot/cli
 server/runtime server/config server/tls server/net
 server/station/state server/station/commands server/station server/station/models server/link server/live
-server/storage/database server/storage/audit server/storage/samples server/storage/commits server/storage/ingest
+server/storage/database server/storage/audit server/storage/samples server/storage/commits server/storage/ingest server/storage/groups
 server/storage/runs server/storage/jobs server/storage/designs server/storage/experiments server/storage/reservations
 server/storage/query server/storage/export server/storage/upkeep server/storage
 server/analysis/metrics server/analysis/comparison server/analysis/report server/analysis/capsule server/analysis server/analysis/tuning

@@ -42,6 +42,7 @@ RecordingParts::RecordingParts(asio::io_context& loop, runtime::Clock& clock, ru
       disk_watch{clock, readers, options.path, space_limits(config)},
       backups{loop, clock, recorder, readers, disk_watch, backup_folder(options.path, config)},
       retention{clock, recorder, reader, disk_watch, references, retention_policy(config)},
+      groups{clock, recorder, reader},
       path_{options.path} {}
 
 void RecordingParts::connect(station::Station& station) {
@@ -81,6 +82,7 @@ void RecordingParts::spawn(runtime::TaskGroup& tasks) {
   tasks.spawn("jobs", jobs.run());
   tasks.spawn("backups", backups.run());
   tasks.spawn("retention", retention.run());
+  tasks.spawn("groups of segments", groups.run());
 }
 
 void RecordingParts::close() {

@@ -13,6 +13,7 @@
 #include "server/station/station.hpp"
 #include "server/storage/database/database_reader.hpp"
 #include "server/storage/designs/designs.hpp"
+#include "server/storage/groups/group_maker.hpp"
 #include "server/storage/ingest/recorder.hpp"
 #include "server/storage/jobs/job_files.hpp"
 #include "server/storage/jobs/jobs.hpp"
@@ -72,6 +73,7 @@ struct RecordingParts {
   DiskWatch disk_watch;
   Backups backups;
   Retention retention;
+  GroupMaker groups;
 
  private:
   std::filesystem::path path_;

@@ -88,6 +88,8 @@ http::Answer answer(http::Request request) {
   const auto channels = api::query_channels(request);
   if (!channels) co_return http::problem(channels.error());
   require(channels->any());
+  const auto of_overview = api::query_overview_channels(request);
+  require(of_overview && of_overview->any());  // whatever samples have, overviews have
   const auto window = api::query_window(request);
   if (!window) co_return http::problem(window.error());
   require(!*window || ((*window)->from_us >= 0 && (*window)->to_us > (*window)->from_us));

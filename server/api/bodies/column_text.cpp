@@ -103,7 +103,7 @@ std::string page_text(const storage::SegmentPage& page) {
   return out;
 }
 
-std::string overview_text(const storage::Overview& overview, storage::Channels channels) {
+std::string overview_text(const storage::Overview& overview, storage::OverviewChannels channels) {
   const storage::OverviewColumns& columns = overview.columns;
   std::string out = columns.from_segments ? R"({"source":"segments",)" : R"({"source":"rows",)";
   append_column(out, "first_utc_us", columns.first_utc_us);
@@ -111,9 +111,9 @@ std::string overview_text(const storage::Overview& overview, storage::Channels c
   append_column(out, "last_utc_us", columns.last_utc_us);
   out += ',';
   append_column(out, "samples", columns.samples);
-  for (std::size_t channel = 0; channel < storage::kChannels; ++channel) {
+  for (std::size_t channel = 0; channel < storage::kOverviewChannels; ++channel) {
     if (!channels[channel]) continue;
-    out += fmt::format(R"(,"{}":{{)", text(static_cast<storage::Channel>(channel)));
+    out += fmt::format(R"(,"{}":{{)", storage::overview_name(channel));
     append_column(out, "min", columns.min[channel]);
     out += ',';
     append_column(out, "max", columns.max[channel]);

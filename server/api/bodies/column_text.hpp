@@ -9,8 +9,8 @@
 
 namespace server::api {
 
-std::string page_text(const storage::SegmentPage& page);                                   // SamplePage
-std::string overview_text(const storage::Overview& overview, storage::Channels channels);  // Overview
-std::string absences_text(const storage::AbsencePage& page);                               // GapList
+std::string page_text(const storage::SegmentPage& page);                                           // SamplePage
+std::string overview_text(const storage::Overview& overview, storage::OverviewChannels channels);  // Overview
+std::string absences_text(const storage::AbsencePage& page);                                       // GapList
 
 }  // namespace server::api

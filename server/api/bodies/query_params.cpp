@@ -60,6 +60,12 @@ Result<storage::Channels> query_channels(const http::Request& request) {
   return storage::parse_channels(given->second);
 }
 
+Result<storage::OverviewChannels> query_overview_channels(const http::Request& request) {
+  const auto given = request.query.find("channels");
+  if (given == request.query.end()) return storage::overview_channels(storage::all_channels());
+  return storage::parse_overview_channels(given->second);
+}
+
 Result<std::optional<storage::TimeWindow>> query_window(const http::Request& request) {
   const auto from_us = query_number(request, "from_us", 0, kLatest - 1, 0);
   if (!from_us) return std::unexpected{from_us.error()};

@@ -25,6 +25,8 @@ Result<std::optional<storage::SampleCursor>> query_cursor(const http::Request& r
 
 // `channels`: names with commas between them, each once; all when it is not given.
 Result<storage::Channels> query_channels(const http::Request& request);
+// The same for overviews, which have more channels; those of samples when it is not given.
+Result<storage::OverviewChannels> query_overview_channels(const http::Request& request);
 
 // `from_us` and `to_us`, UTC, the second above the first; none when neither is given.
 Result<std::optional<storage::TimeWindow>> query_window(const http::Request& request);

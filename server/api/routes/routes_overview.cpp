@@ -13,7 +13,7 @@ constexpr std::int64_t kDefaultPoints = 2'000;
 http::Answer overview(OverviewRoutes parts, http::Request request, storage::Excerpt excerpt) {
   const auto points = query_number(request, "points", 1, kMaxPoints, kDefaultPoints);
   if (!points) co_return http::problem(points.error());
-  const auto channels = query_channels(request);
+  const auto channels = query_overview_channels(request);
   if (!channels) co_return http::problem(channels.error());
   const storage::OverviewQuery query{.points = static_cast<std::size_t>(*points), .channels = *channels};
   auto found = co_await parts.history.overview(std::move(excerpt), query);

@@ -13,6 +13,7 @@ namespace server::storage {
 
 constexpr std::int32_t kApplicationId = 0x5268656f;  // "Rheo"
 constexpr std::int64_t kMaxSegmentSamples = 100;     // the views and queries look this far back for a segment's begin
+constexpr std::uint64_t kBootsApart = 37;  // samples between the ends of complete segments of successive boots
 
 // SQL scripts, in order. Any thread.
 std::span<const char* const> migrations();

@@ -1,13 +1,16 @@
 // Binding and reading of the store's value types, on top of SQLiteCpp: 64-bit ids are stored as two's complement, a
-// missing or non-finite number as NULL.
+// missing or non-finite number as NULL. For statements that give or take very many rows there are raw ones, without a
+// shared pointer for each value.
 #pragma once
 
 #include <SQLiteCpp/SQLiteCpp.h>
+#include <sqlite3.h>
 
 #include <bit>
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <memory>
 #include <optional>
 #include <string>
 
@@ -60,6 +63,34 @@ inline float float_or_nan(const SQLite::Column& column) {
 }
 inline std::optional<float> optional_float(const SQLite::Column& column) {
   return column.isNull() ? std::nullopt : std::optional{static_cast<float>(column.getDouble())};
+}
+
+struct FinalizeStatement {
+  void operator()(sqlite3_stmt* statement) const { sqlite3_finalize(statement); }
+};
+using RawStatement = std::unique_ptr<sqlite3_stmt, FinalizeStatement>;
+
+[[noreturn]] inline void fail_with(SQLite::Database& database) { throw SQLite::Exception{database.getHandle()}; }
+
+// To be used many times.
+inline RawStatement prepare_raw(SQLite::Database& database, const std::string& sql) {
+  sqlite3_stmt* statement = nullptr;
+  const int result =
+      sqlite3_prepare_v3(database.getHandle(), sql.c_str(), -1, SQLITE_PREPARE_PERSISTENT, &statement, nullptr);
+  if (result != SQLITE_OK) fail_with(database);
+  return RawStatement{statement};
+}
+
+// SQLite keeps integers signed: what was stored as two's complement comes back so.
+inline std::uint64_t unsigned_at(sqlite3_stmt* row, int column) {
+  return std::bit_cast<std::uint64_t>(std::int64_t{sqlite3_column_int64(row, column)});
+}
+
+// NULL reads as 0, so only a 0 is looked at twice.
+inline float float_at(sqlite3_stmt* row, int column) {
+  const double value = sqlite3_column_double(row, column);
+  const bool is_null = value == 0 && sqlite3_column_type(row, column) == SQLITE_NULL;
+  return is_null ? std::numeric_limits<float>::quiet_NaN() : static_cast<float>(value);
 }
 
 }  // namespace server::storage

@@ -21,9 +21,6 @@ constexpr std::int64_t kTimeToleranceUs = 100;
 constexpr std::int64_t kUtcToleranceUs = 1000;
 constexpr std::int64_t kUnknownUtcToleranceUs = 1'000'000;
 
-// Successive boots have complete segments 37 samples apart: any 100 of them are spread evenly.
-constexpr std::uint64_t kBootsApart = 37;
-
 constexpr microseconds kHolePatience = 500ms;  // before a hole that does not shrink is asked for
 constexpr microseconds kAskInterval = 1s;
 
@@ -119,7 +116,7 @@ void BootRecording::append(const station::SampleBatch& batch, std::int64_t stead
   }
 }
 
-// How many samples from this one on the segment may have.
+// How many samples from this one on the segment may have. Any 100 boots end their segments at samples spread evenly.
 std::uint64_t BootRecording::room_from(std::uint64_t seq) const {
   constexpr std::uint64_t kMost = kMaxSegmentSamples;
   return kMost - (seq + kBootsApart * static_cast<std::uint64_t>(key_ - 1)) % kMost;

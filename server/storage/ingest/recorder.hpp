@@ -165,6 +165,8 @@ class Recorder final : public station::StationSink, public station::RobotArchive
   std::size_t queued_samples() const;
   // The last commit failed: nothing becomes durable now.
   bool failing() const { return failure_.is_failing(); }
+  // The disk fails, or commits are late, or the write-ahead log is large: what can wait makes room for commits.
+  bool is_behind() const { return failing() || queued_samples() > 500'000 || wal().bytes > 96'000'000; }
   std::size_t flushes() const { return flushes_.size(); }  // who waits for a commit
   const WalState& wal() const { return checkpointer_.state(); }
   const std::string& problem() const { return failure_.problem(); }  // while it is failing: why, and what to do

@@ -1,4 +1,4 @@
-// Segments' heads, or rows, gathered into points.
+// Groups, segments' heads, or rows, gathered into points.
 #include "server/storage/query/overview.hpp"
 
 #include <algorithm>
@@ -27,68 +27,59 @@ std::int64_t utc_us(const Segment& segment, std::size_t index) {
   return static_cast<std::int64_t>(segment.robot_time_us(index)) + segment.utc_offset_us;
 }
 
-// fmin and fmax pass over NaN.
-void widen(Extent& extent, const station::Sample& sample) {
-  for (std::size_t channel = 0; channel < kChannels; ++channel) {
-    const float value = sample.*kSampleMembers[channel];
-    extent.min[channel] = std::fmin(extent.min[channel], value);
-    extent.max[channel] = std::fmax(extent.max[channel], value);
-  }
-}
-
-// The samples [begin, end) of the segment.
-Extent extent_of(const Segment& segment, std::size_t begin, std::size_t end) {
+// The samples [begin, end) of the segment. fmin and fmax pass over NaN.
+Extent extent_of(const Segment& segment, std::size_t begin, std::size_t end, OverviewChannels channels) {
   Extent extent;
-  extent.samples = {segment.first_seq + begin, segment.first_seq + end};
+  extent.numbers = {segment.first_seq + begin, segment.first_seq + end};
+  extent.samples = end - begin;
   extent.first_utc_us = utc_us(segment, begin);
   extent.last_utc_us = utc_us(segment, end - 1);
   extent.min.fill(kNaN);
   extent.max.fill(kNaN);
-  for (std::size_t index = begin; index < end; ++index) widen(extent, segment.samples[index]);
+  for (std::size_t channel = 0; channel < kOverviewChannels; ++channel) {
+    if (!channels[channel]) continue;
+    for (std::size_t index = begin; index < end; ++index) {
+      const float value = overview_value(channel, segment.samples[index], segment.context);
+      extent.min[channel] = std::fmin(extent.min[channel], value);
+      extent.max[channel] = std::fmax(extent.max[channel], value);
+    }
+  }
   return extent;
 }
 
-Extent extent_of(const Segment& segment) { return extent_of(segment, 0, segment.samples.size()); }
-
-Extent extent_of(const SegmentHead& head) {
-  Extent extent;
-  extent.samples = {head.first_seq, head.next_seq};
-  extent.first_utc_us = static_cast<std::int64_t>(head.first_robot_time_us) + head.utc_offset_us;
-  const std::uint64_t last = head.next_seq - 1 - head.first_seq;
-  extent.last_utc_us = extent.first_utc_us + static_cast<std::int64_t>(last * head.period_us);
-  extent.min = head.min;
-  extent.max = head.max;
-  return extent;
+Extent extent_of(const Segment& segment, OverviewChannels channels) {
+  return extent_of(segment, 0, segment.samples.size(), channels);
 }
 
 // Of the stored segments in the range; one that reaches beyond it is cut, for which its rows are read.
 std::vector<Extent> read_extents(SQLite::Database& database, const RecordedSpan& span, Interval range,
-                                 Channels channels) {
-  const SQLite::Transaction moment{database};  // nothing is purged between a head and its rows
+                                 OverviewChannels channels) {
   std::vector<Extent> extents;
   for (const SegmentHead& head : read_heads(database, span.boot_key, range, channels, kSliceHeads)) {
     if (head.first_seq >= range.first && head.next_seq <= range.next) {
       extents.push_back(extent_of(head));
       continue;
     }
-    SampleScanner scanner{database, channels};
+    SampleScanner scanner{database, sample_channels(channels)};
     scanner.begin(span.boot_key, {std::max(head.first_seq, range.first), std::min(head.next_seq, range.next)});
     Segment segment;
-    if (scanner.next(segment)) extents.push_back(extent_of(segment));
+    if (scanner.next(segment)) extents.push_back(extent_of(segment, channels));
   }
   return extents;
 }
 
 // The waiting samples of the range that are not among the stored ones.
-void add_waiting(const RecordedSpan& span, Interval range, std::vector<Extent>& extents) {
+void add_waiting(const RecordedSpan& span, Interval range, OverviewChannels channels, std::vector<Extent>& extents) {
   if (span.waiting.empty()) return;
   IntervalSet stored;
-  for (const Extent& extent : extents) stored.insert(extent.samples);
+  for (const Extent& extent : extents) stored.insert(extent.numbers);
   for (const Segment& segment : span.waiting) {
     const Interval part{std::max(segment.first_seq, range.first), std::min(segment.next_seq(), range.next)};
-    for (const Interval& missing : stored.missing(part)) extents.push_back(extent_of(part_of(segment, missing)));
+    for (const Interval& missing : stored.missing(part)) {
+      extents.push_back(extent_of(part_of(segment, missing), channels));
+    }
   }
-  std::ranges::sort(extents, {}, [](const Extent& extent) { return extent.samples.first; });
+  std::ranges::sort(extents, {}, [](const Extent& extent) { return extent.numbers.first; });
 }
 
 // How many segments the span has, at most `limit`; from the index alone.
@@ -122,6 +113,7 @@ bool OverviewScan::advance(SQLite::Database& database) {
 void OverviewScan::choose(SQLite::Database& database) {
   chosen_ = true;
   const std::size_t enough = (query_.points * 2 + 4) / 5;  // 0.4 of the points
+  by_groups_ = places_ / kGroupNumbers >= enough;
   std::size_t segments = 0;
   if (places_ / kSegmentSamples < query_.points) {
     for (const RecordedSpan& span : spans_) {
@@ -133,7 +125,7 @@ void OverviewScan::choose(SQLite::Database& database) {
 }
 
 bool OverviewScan::advance_rows(SQLite::Database& database) {
-  const SegmentPage page = read_segments(database, spans_, after_, kSliceSamples, query_.channels);
+  const SegmentPage page = read_segments(database, spans_, after_, kSliceSamples, sample_channels(query_.channels));
   for (const SpanSegment& part : page.segments) {
     const auto same = [&part](const RecordedSpan& span) { return span.span == part.span; };
     add_rows(static_cast<std::size_t>(std::ranges::find_if(spans_, same) - spans_.begin()), part.segment);
@@ -148,18 +140,32 @@ void OverviewScan::add_rows(std::size_t span, const Segment& segment) {
     const std::uint64_t point = point_of(first_place + begin, query_.points, places_);
     const std::uint64_t next_place = place_of(point + 1, query_.points, places_);
     const std::size_t end = std::min<std::size_t>(segment.samples.size(), next_place - first_place);
-    add(first_place + begin, extent_of(segment, begin, end));
+    add(first_place + begin, extent_of(segment, begin, end, query_.channels));
     begin = end;
   }
+}
+
+// What is stored of the next piece of the range, which is cut to it: a run of groups, or the segments up to the next
+// one.
+std::vector<Extent> OverviewScan::read_next(SQLite::Database& database, Interval& range) {
+  const SQLite::Transaction moment{database};  // nothing is purged between a group or a head and its rows
+  const RecordedSpan& span = spans_[span_];
+  if (by_groups_) {
+    GroupRun run = read_groups(database, span.boot_key, range, query_.channels, kSliceHeads);
+    range.next = run.groups.empty() ? run.next_group : run.groups.back().numbers.next;
+    if (!run.groups.empty()) return std::move(run.groups);
+  }
+  std::vector<Extent> extents = read_extents(database, span, range, query_.channels);
+  if (extents.size() == kSliceHeads) range.next = extents.back().numbers.next;
+  return extents;
 }
 
 bool OverviewScan::advance_segments(SQLite::Database& database) {
   const RecordedSpan& span = spans_[span_];
   Interval range{next_seq_, span.samples.next};
-  std::vector<Extent> extents = read_extents(database, span, range, query_.channels);
-  if (extents.size() == kSliceHeads) range.next = extents.back().samples.next;
-  add_waiting(span, range, extents);
-  for (const Extent& extent : extents) add(first_place_[span_] + extent.samples.first - span.samples.first, extent);
+  std::vector<Extent> extents = read_next(database, range);
+  add_waiting(span, range, query_.channels, extents);
+  for (const Extent& extent : extents) add(first_place_[span_] + extent.numbers.first - span.samples.first, extent);
   next_seq_ = range.next;
   while (span_ < spans_.size() && next_seq_ >= spans_[span_].samples.next) {
     if (++span_ < spans_.size()) next_seq_ = spans_[span_].samples.first;
@@ -177,8 +183,8 @@ void OverviewScan::add(std::uint64_t place, const Extent& extent) {
     columns_.samples.emplace_back();
   }
   columns_.last_utc_us.back() = extent.last_utc_us;
-  columns_.samples.back() += extent.samples.next - extent.samples.first;
-  for (std::size_t channel = 0; channel < kChannels; ++channel) {
+  columns_.samples.back() += extent.samples;
+  for (std::size_t channel = 0; channel < kOverviewChannels; ++channel) {
     if (!query_.channels[channel]) continue;
     std::vector<float>& min = columns_.min[channel];
     std::vector<float>& max = columns_.max[channel];

@@ -6,8 +6,10 @@
 // span and number, never by UTC, which steps when a clock is set.
 //
 // Segments keep their extremes, so an overview of many samples reads no rows: where a point is at least a segment long
-// (100 samples), or 0.4 N segments are there, each segment goes whole to the point of its first sample. Otherwise rows
-// are read, at most 40 N. Either way the extremes are exact for the samples that the point says it stands for.
+// (100 samples), or 0.4 N segments are there, each segment goes whole to the point of its first sample. Where 0.4 N
+// groups of segments (6400 samples each) fit into the spans, groups take their place, and only what has no group is
+// read by segments. Otherwise rows are read, at most 40 N. Either way the extremes are exact for the samples that the
+// point says it stands for.
 //
 // On the thread that owns the database handle.
 #pragma once
@@ -19,13 +21,14 @@
 #include <optional>
 #include <vector>
 
+#include "server/storage/groups/segment_groups.hpp"
 #include "server/storage/query/span_reader.hpp"
 
 namespace server::storage {
 
 struct OverviewQuery {
   std::size_t points = 2000;  // at least 1
-  Channels channels = all_channels();
+  OverviewChannels channels = overview_channels(all_channels());
 };
 
 // A row per point.
@@ -34,17 +37,8 @@ struct OverviewColumns {
   std::vector<std::int64_t> first_utc_us;  // of its first sample
   std::vector<std::int64_t> last_utc_us;   // of its last one
   std::vector<std::uint64_t> samples;
-  std::array<std::vector<float>, kChannels> min;  // by Channel; NaN: no finite value; empty unless asked for
-  std::array<std::vector<float>, kChannels> max;
-};
-
-// Consecutive samples that go to a point together.
-struct Extent {
-  Interval samples;
-  std::int64_t first_utc_us = 0;
-  std::int64_t last_utc_us = 0;
-  std::array<float, kChannels> min{};
-  std::array<float, kChannels> max{};
+  std::array<std::vector<float>, kOverviewChannels> min;  // NaN: no finite value; empty unless asked for
+  std::array<std::vector<float>, kOverviewChannels> max;
 };
 
 // Makes an overview piece by piece.
@@ -61,6 +55,7 @@ class OverviewScan {
   void choose(SQLite::Database& database);
   bool advance_rows(SQLite::Database& database);
   bool advance_segments(SQLite::Database& database);
+  std::vector<Extent> read_next(SQLite::Database& database, Interval& range);
   void add_rows(std::size_t span, const Segment& segment);
   void add(std::uint64_t place, const Extent& extent);
 
@@ -69,6 +64,7 @@ class OverviewScan {
   std::vector<std::uint64_t> first_place_;  // of each span
   std::uint64_t places_ = 0;
   bool chosen_ = false;
+  bool by_groups_ = false;
   std::optional<SampleCursor> after_;  // rows: where to go on
   std::size_t span_ = 0;               // segments: where to go on
   std::uint64_t next_seq_ = 0;

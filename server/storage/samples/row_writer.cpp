@@ -26,16 +26,9 @@ std::string insert_query(std::size_t rows) {
 }  // namespace
 
 RowWriter::RowWriter(SQLite::Database& database)
-    : database_{database}, insert_block_{prepare(kBlockRows)}, insert_one_{prepare(1)} {}
-
-RawStatement RowWriter::prepare(std::size_t rows) {
-  const std::string sql = insert_query(rows);
-  sqlite3_stmt* statement = nullptr;
-  const int result =
-      sqlite3_prepare_v3(database_.getHandle(), sql.c_str(), -1, SQLITE_PREPARE_PERSISTENT, &statement, nullptr);
-  if (result != SQLITE_OK) throw SQLite::Exception{database_.getHandle(), result};
-  return RawStatement{statement};
-}
+    : database_{database},
+      insert_block_{prepare_raw(database, insert_query(kBlockRows))},
+      insert_one_{prepare_raw(database, insert_query(1))} {}
 
 Extremes RowWriter::write(const std::vector<station::Sample>& samples, std::int64_t first_row) {
   constexpr float kInfinity = std::numeric_limits<float>::infinity();

@@ -12,7 +12,8 @@
 #include <vector>
 
 #include "server/station/state/station_state.hpp"
-#include "server/storage/samples/sample_scanner.hpp"
+#include "server/storage/database/statement.hpp"
+#include "server/storage/samples/channels.hpp"
 
 namespace server::storage {
 
@@ -41,7 +42,6 @@ class RowWriter {
     std::array<float, kChannels> values{};
   };
 
-  RawStatement prepare(std::size_t rows);
   void insert(sqlite3_stmt* statement, std::span<const Row> rows);
 
   SQLite::Database& database_;

@@ -36,39 +36,16 @@ std::string segment_query(std::int64_t version) {
   return sql + ", " + (version >= kUnknownValuesSince ? "unknown_values" : "NULL") + kInRange;
 }
 
-Channel channel(std::size_t index) { return static_cast<Channel>(index); }
-
 // The largest seq of the range that SQLite can hold.
 std::int64_t last_of(Interval samples) {
   constexpr std::uint64_t kLargest = std::numeric_limits<std::int64_t>::max();
   return static_cast<std::int64_t>(std::min(samples.next - 1, kLargest));
 }
 
-[[noreturn]] void fail_with(SQLite::Database& database) { throw SQLite::Exception{database.getHandle()}; }
-
-RawStatement prepare(SQLite::Database& database, const std::string& sql) {
-  sqlite3_stmt* statement = nullptr;
-  const int result =
-      sqlite3_prepare_v3(database.getHandle(), sql.c_str(), -1, SQLITE_PREPARE_PERSISTENT, &statement, nullptr);
-  if (result != SQLITE_OK) fail_with(database);
-  return RawStatement{statement};
-}
-
 void bind_range(sqlite3_stmt* statement, std::int64_t boot_key, Interval samples) {
   sqlite3_bind_int64(statement, 1, boot_key);
   sqlite3_bind_int64(statement, 2, static_cast<std::int64_t>(samples.first));
   sqlite3_bind_int64(statement, 3, last_of(samples));
-}
-
-// SQLite keeps integers signed: what was stored as two's complement comes back so.
-std::uint64_t unsigned_at(sqlite3_stmt* row, int column) {
-  return static_cast<std::uint64_t>(sqlite3_column_int64(row, column));
-}
-
-// NULL reads as 0, so only a 0 is looked at twice.
-float float_at(sqlite3_stmt* row, int column) {
-  const double value = sqlite3_column_double(row, column);
-  return value == 0 && sqlite3_column_type(row, column) == SQLITE_NULL ? kNaN : static_cast<float>(value);
 }
 
 std::optional<float> optional_at(sqlite3_stmt* row, int column) {
@@ -88,37 +65,14 @@ void read_enumerator(sqlite3_stmt* row, int column, Named& last, Enumerator& int
 
 }  // namespace
 
-const char* text(Channel value) { return station::kSampleFields[static_cast<std::size_t>(value)].name; }
-
-Result<Channels> parse_channels(std::string_view text) {
-  Channels channels;
-  for (bool more = true; more;) {
-    const std::size_t comma = text.find(',');
-    const std::string_view name = text.substr(0, comma);
-    std::size_t index = 0;
-    while (index < kChannels && name != storage::text(channel(index))) ++index;
-    if (index == kChannels || channels[index]) {
-      const char* problem = index == kChannels ? "is no channel" : "is given twice";
-      return fail(ErrorCode::bad_request, fmt::format("channels: '{}' {}", name.substr(0, 40), problem),
-                  "out_of_range");
-    }
-    channels.set(index);
-    more = comma != std::string_view::npos;
-    if (more) text.remove_prefix(comma + 1);
-  }
-  return channels;
-}
-
-void FinalizeStatement::operator()(sqlite3_stmt* statement) const { sqlite3_finalize(statement); }
-
 SampleScanner::SampleScanner(SQLite::Database& database, Channels channels) : database_{database}, channels_{channels} {
   const std::int64_t version = database.execAndGet("PRAGMA user_version").getInt64();
-  segments_ = prepare(database, segment_query(version));
+  segments_ = prepare_raw(database, segment_query(version));
   std::string sql = "SELECT row";
   for (std::size_t index = 0; index < kChannels; ++index) {
     if (channels[index]) (sql += ", ") += column_or_null(station::kSampleFields[index], version);
   }
-  rows_ = prepare(database, sql + " FROM sample WHERE row >= ?1 ORDER BY row");
+  rows_ = prepare_raw(database, sql + " FROM sample WHERE row >= ?1 ORDER BY row");
 }
 
 void SampleScanner::begin(std::int64_t boot_key, Interval samples) {
@@ -215,18 +169,18 @@ void SampleScanner::seek(std::int64_t row) {
 }
 
 std::vector<SegmentHead> read_heads(SQLite::Database& database, std::int64_t boot_key, Interval samples,
-                                    Channels channels, std::size_t limit) {
+                                    OverviewChannels channels, std::size_t limit) {
   std::vector<SegmentHead> heads;
   if (samples.next <= samples.first) return heads;
   std::string sql =
       "SELECT first_seq, last_seq, first_robot_time_us, period_us, utc_offset_us, clock_uncertainty_us, flags";
   const std::int64_t version = database.execAndGet("PRAGMA user_version").getInt64();
-  for (std::size_t index = 0; index < kChannels; ++index) {
+  for (std::size_t index = 0; index < kOverviewChannels; ++index) {
     if (!channels[index]) continue;
-    const bool is_stored = station::kSampleFields[index].since_schema <= version;
-    sql += is_stored ? fmt::format(", min_{0}, max_{0}", text(channel(index))) : ", NULL, NULL";
+    const ExtremeColumns columns = extreme_columns(index, version);
+    sql += fmt::format(", {}, {}", columns.min, columns.max);
   }
-  const RawStatement statement = prepare(database, sql + kInRange + " LIMIT ?4");
+  const RawStatement statement = prepare_raw(database, sql + kInRange + " LIMIT ?4");
   sqlite3_stmt* row = statement.get();
   bind_range(row, boot_key, samples);
   sqlite3_bind_int64(row, 4, static_cast<std::int64_t>(limit));
@@ -241,7 +195,7 @@ std::vector<SegmentHead> read_heads(SQLite::Database& database, std::int64_t boo
     head.clock_uncertainty_us = sqlite3_column_int64(row, 5);
     head.flags = static_cast<std::uint32_t>(unsigned_at(row, 6));
     int column = 6;
-    for (std::size_t index = 0; index < kChannels; ++index) {
+    for (std::size_t index = 0; index < kOverviewChannels; ++index) {
       head.min[index] = channels[index] ? float_at(row, ++column) : kNaN;
       head.max[index] = channels[index] ? float_at(row, ++column) : kNaN;
     }

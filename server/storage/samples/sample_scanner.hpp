@@ -10,45 +10,18 @@
 #include <SQLiteCpp/SQLiteCpp.h>
 
 #include <array>
-#include <bitset>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
 #include <memory>
 #include <string>
-#include <string_view>
 #include <vector>
 
-#include "server/runtime/result.hpp"
-#include "server/station/state/telemetry_fields.hpp"
+#include "server/storage/database/statement.hpp"
+#include "server/storage/samples/channels.hpp"
 #include "server/storage/samples/segment.hpp"
 
-struct sqlite3_stmt;
-
 namespace server::storage {
-
-// A row of kSampleFields, by its index.
-enum class Channel : std::uint8_t {};
-constexpr std::size_t kChannels = station::kSampleFieldCount;
-using Channels = std::bitset<kChannels>;
-inline Channels all_channels() { return Channels{}.set(); }
-
-// By Channel.
-inline constexpr auto kSampleMembers = [] {
-  std::array<float station::Sample::*, kChannels> members{};
-  for (std::size_t index = 0; index < kChannels; ++index) members[index] = station::kSampleFields[index].member;
-  return members;
-}();
-
-const char* text(Channel value);
-
-// "position_m,duty": names with commas between them, each once; bad_request says which one is not.
-Result<Channels> parse_channels(std::string_view text);
-
-struct FinalizeStatement {
-  void operator()(sqlite3_stmt* statement) const;
-};
-using RawStatement = std::unique_ptr<sqlite3_stmt, FinalizeStatement>;
 
 class SampleScanner {
  public:
@@ -96,13 +69,14 @@ struct SegmentHead {
   std::uint32_t period_us = 0;
   std::int64_t utc_offset_us = 0;
   std::int64_t clock_uncertainty_us = -1;
-  std::array<float, kChannels> min{};  // by Channel; NaN: no finite value, or not asked for
-  std::array<float, kChannels> max{};
+  std::array<float, kOverviewChannels> min{};  // by overview_index; NaN: no finite value, or not asked for
+  std::array<float, kOverviewChannels> max{};
   std::uint32_t flags = 0;  // TelemetryFlag
 };
 
 // The heads of the segments that have a sample in the range, ascending and not cut to it; the first `limit` of them.
 std::vector<SegmentHead> read_heads(SQLite::Database& database, std::int64_t boot_key, Interval samples,
-                                    Channels channels, std::size_t limit = std::numeric_limits<std::int32_t>::max());
+                                    OverviewChannels channels,
+                                    std::size_t limit = std::numeric_limits<std::int32_t>::max());
 
 }  // namespace server::storage

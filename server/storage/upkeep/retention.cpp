@@ -16,10 +16,8 @@ using namespace std::chrono_literals;
 namespace {
 
 constexpr microseconds kLookInterval = 30s;
-constexpr microseconds kPause = 10ms;            // at least, between two steps
-constexpr microseconds kPauseWhenBehind = 1s;    // while commits are behind, or the write-ahead log is large
-constexpr std::size_t kManyQueued = 500'000;     // samples
-constexpr std::uint64_t kLargeLog = 96'000'000;  // bytes
+constexpr microseconds kPause = 10ms;  // at least, between two steps
+constexpr microseconds kPauseWhenBehind = 1s;
 constexpr std::int64_t kDayUs = 86'400'000'000;
 // The database is made smaller from this part of its limit on, to that part: so that the file need not grow over it.
 constexpr std::uint64_t kBeginPercent = 95;
@@ -167,10 +165,8 @@ asio::awaitable<std::int64_t> Retention::next_row() {
 }
 
 asio::awaitable<void> Retention::make_room_for_commits(std::int64_t took_us) {
-  const bool behind =
-      recorder_.failing() || recorder_.queued_samples() > kManyQueued || recorder_.wal().bytes > kLargeLog;
   const microseconds took{took_us};
-  co_await clock_.sleep_for(behind ? kPauseWhenBehind : std::max(kPause, took));
+  co_await clock_.sleep_for(recorder_.is_behind() ? kPauseWhenBehind : std::max(kPause, took));
 }
 
 }  // namespace server::storage

@@ -8,6 +8,7 @@
 #include <map>
 
 #include "server/storage/database/statement.hpp"
+#include "server/storage/groups/segment_groups.hpp"
 #include "server/storage/runs/run_digest.hpp"
 #include "server/storage/runs/run_queries.hpp"
 #include "server/storage/samples/interval_set.hpp"
@@ -71,6 +72,7 @@ class Checking {
 
   void check_rows_counter();
   void check_boots();
+  void check_groups(std::int64_t boot_key);
   void check_owners();
   void check_spans(std::optional<RunId> run);
   void check_samples_of(RunId run);
@@ -99,6 +101,7 @@ class Checking {
   SQLite::Database& database_;
   const StoreCheck& options_;
   StoreFindings& findings_;
+  bool has_groups_ = database_.tableExists("segment_group");  // an exported run has none
   SQLite::Statement rows_{database_, "SELECT count(*) FROM sample WHERE row BETWEEN ? AND ?"};
   SQLite::Statement extremes_{database_, extremes_query(database_.execAndGet("PRAGMA user_version").getInt64())};
 };
@@ -114,6 +117,15 @@ void Checking::check_rows_counter() {
 void Checking::check_boots() {
   for (const std::int64_t boot_key : numbers(database_, "SELECT boot_key FROM boot ORDER BY boot_key")) {
     check_segments(boot_key, {0, kEverySeq}, "");
+    check_groups(boot_key);
+  }
+}
+
+void Checking::check_groups(std::int64_t boot_key) {
+  if (!options_.integrity || !has_groups_) return;
+  for (const Interval& window : wrong_groups(database_, boot_key)) {
+    fault("the group of samples {} to {} of boot key {} is not what its segments say: overviews may be wrong",
+          window.first, window.next - 1, boot_key);
   }
 }
 

@@ -197,9 +197,9 @@ TEST_F(CheckpointTest, AnIdleStationDoesNotTryAgainAndAgain) {
   make(robot_, 100'000, 500);
   clock_.run_for(100ms);
   EXPECT_GT(recorder_->wal().bytes, kCheckpointBytes);
-  clock_.run_for(3s);
+  clock_.run_for(75s);  // in which groups of segments are made, and moved
   const std::uint64_t checkpoints = recorder_->wal().checkpoints;
-  clock_.run_for(60s);
+  clock_.run_for(150s);
   EXPECT_EQ(recorder_->wal().checkpoints, checkpoints);
   EXPECT_EQ(recorder_->wal().held_since_us, 0);
   make(robot_, 100);

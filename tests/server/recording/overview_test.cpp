@@ -3,64 +3,14 @@
 #include "server/storage/query/overview.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <set>
-#include <span>
 
-#include "tests/server/recording/random_recording.hpp"
+#include "tests/server/recording/overview_fixture.hpp"
 
 namespace server {
 namespace {
 
-class OverviewTest : public RandomRecordingTest {
- protected:
-  storage::Overview overview(storage::Excerpt excerpt, std::size_t points,
-                             storage::Channels channels = storage::all_channels()) {
-    return wait(history_->overview(std::move(excerpt), {.points = points, .channels = channels})).value();
-  }
-
-  // The points stand for the samples one after another.
-  static void expect_same(const storage::OverviewColumns& columns, std::span<const storage::StoredSample> samples,
-                          storage::Channels channels) {
-    std::size_t begin = 0;
-    for (std::size_t point = 0; point < columns.samples.size(); ++point) {
-      ASSERT_GT(columns.samples[point], 0u);
-      ASSERT_LE(begin + columns.samples[point], samples.size());
-      const auto of_point = samples.subspan(begin, columns.samples[point]);
-      EXPECT_EQ(columns.first_utc_us[point], of_point.front().utc_us);
-      EXPECT_EQ(columns.last_utc_us[point], of_point.back().utc_us);
-      for (std::size_t channel = 0; channel < storage::kChannels; ++channel) {
-        if (channels[channel]) expect_extremes(columns, channel, point, of_point);
-      }
-      begin += columns.samples[point];
-    }
-    EXPECT_EQ(begin, samples.size());
-  }
-
-  static void expect_extremes(const storage::OverviewColumns& columns, std::size_t channel, std::size_t point,
-                              std::span<const storage::StoredSample> samples) {
-    float min = NAN;
-    float max = NAN;
-    for (const storage::StoredSample& stored : samples) {
-      min = std::fmin(min, stored.sample.*storage::kSampleMembers[channel]);
-      max = std::fmax(max, stored.sample.*storage::kSampleMembers[channel]);
-    }
-    const float found_min = columns.min[channel].at(point);
-    const float found_max = columns.max[channel].at(point);
-    EXPECT_TRUE(found_min == min || (std::isnan(found_min) && std::isnan(min))) << found_min << " " << min;
-    EXPECT_TRUE(found_max == max || (std::isnan(found_max) && std::isnan(max))) << found_max << " " << max;
-  }
-
-  // A robot with samples without a hole, stored in segments of 100.
-  storage::RunId record_plain(std::size_t samples) {
-    start();
-    connect(robot_);
-    const storage::RunId run = wait(runs_->create(robot_.id, named("run")))->id;
-    make(robot_, samples, 25);
-    flush();
-    return run;
-  }
-};
+class OverviewTest : public OverviewFixture {};
 
 TEST_F(OverviewTest, SaysWhatAWalkOverTheSamplesSays) {
   for (const unsigned seed : {1U, 2U, 3U, 4U}) {
@@ -74,7 +24,7 @@ TEST_F(OverviewTest, SaysWhatAWalkOverTheSamplesSays) {
       SCOPED_TRACE(points);
       const storage::OverviewColumns columns = overview(storage::excerpt_of(run), points).columns;
       EXPECT_LE(columns.samples.size(), points);
-      expect_same(columns, samples, storage::all_channels());
+      expect_same(columns, samples);
       sources.insert(columns.from_segments);
     }
     EXPECT_EQ(sources.size(), 2u) << "segments and rows";
@@ -95,7 +45,7 @@ TEST_F(OverviewTest, SaysTheSameOnceTheLastSamplesAreStored) {
   const storage::OverviewColumns after = overview(storage::excerpt_of(run), 20).columns;
   EXPECT_EQ(before.samples, after.samples);
   EXPECT_EQ(before.last_utc_us, after.last_utc_us);
-  expect_same(after, samples, storage::all_channels());
+  expect_same(after, samples);
 }
 
 TEST_F(OverviewTest, ListsTheGaps) {
@@ -112,11 +62,11 @@ TEST_F(OverviewTest, ListsTheGaps) {
 TEST_F(OverviewTest, HoldsOnlyTheChannelsThatAreAskedFor) {
   const storage::RunId run = record(7);
   const std::vector<storage::StoredSample> samples = samples_of(run);
-  const storage::Channels channels = storage::parse_channels("duty,position_m").value();
+  const auto channels = storage::parse_overview_channels("duty,estimated_position_m,position_m,setpoint_m").value();
   for (const std::size_t points : {3u, 500u}) {
     const storage::OverviewColumns columns = overview(storage::excerpt_of(run), points, channels).columns;
     expect_same(columns, samples, channels);
-    for (std::size_t channel = 0; channel < storage::kChannels; ++channel) {
+    for (std::size_t channel = 0; channel < storage::kOverviewChannels; ++channel) {
       EXPECT_EQ(columns.min[channel].empty(), !channels[channel]);
     }
   }
@@ -203,7 +153,7 @@ TEST_F(OverviewTest, SlicesOfSegmentsJoinWithoutASeam) {
   const storage::OverviewColumns columns = overview(storage::excerpt_of(run), 50).columns;
   EXPECT_TRUE(columns.from_segments);
   EXPECT_EQ(columns.samples, (std::vector<std::uint64_t>(50, 101)));
-  expect_same(columns, samples_of(run), storage::all_channels());
+  expect_same(columns, samples_of(run));
 }
 
 TEST_F(OverviewTest, TheCountOfSegmentsIsAnsweredByTheIndexAlone) {

@@ -169,7 +169,8 @@ TEST_P(RandomRecording, HeadsHoldTheExtremesOfTheirSegments) {
   channels.set(0).set(4);
   storage::SampleScanner scanner{database, channels};
   for (std::int64_t boot_key = 1; boot_key <= 4; ++boot_key) {
-    for (const storage::SegmentHead& head : read_heads(database, boot_key, range, channels)) {
+    for (const storage::SegmentHead& head :
+         read_heads(database, boot_key, range, storage::overview_channels(channels))) {
       EXPECT_TRUE(head.first_seq < range.next && head.next_seq > range.first);
       storage::Segment segment;
       scanner.begin(boot_key, {head.first_seq, head.next_seq});
@@ -188,11 +189,11 @@ TEST_P(RandomRecording, HeadsHoldTheExtremesOfTheirSegments) {
         low.impedance_mv = std::fmin(low.impedance_mv, sample.impedance_mv);
         high.impedance_mv = std::fmax(high.impedance_mv, sample.impedance_mv);
       }
-      EXPECT_EQ(text_of(head.min[0]), text_of(low.position_m));
-      EXPECT_EQ(text_of(head.max[0]), text_of(high.position_m));
-      EXPECT_EQ(text_of(head.min[4]), text_of(low.impedance_mv));
-      EXPECT_EQ(text_of(head.max[4]), text_of(high.impedance_mv));
-      EXPECT_TRUE(std::isnan(head.min[1]) && std::isnan(head.max[5]));
+      EXPECT_EQ(text_of(head.min[storage::overview_index(0)]), text_of(low.position_m));
+      EXPECT_EQ(text_of(head.max[storage::overview_index(0)]), text_of(high.position_m));
+      EXPECT_EQ(text_of(head.min[storage::overview_index(4)]), text_of(low.impedance_mv));
+      EXPECT_EQ(text_of(head.max[storage::overview_index(4)]), text_of(high.impedance_mv));
+      EXPECT_TRUE(std::isnan(head.min[storage::overview_index(1)]) && std::isnan(head.max[storage::overview_index(5)]));
     }
   }
 }
@@ -219,8 +220,8 @@ TEST_F(SampleScannerTest, AnEmptyRangeAndAnUnknownBootHaveNoSamples) {
   EXPECT_TRUE(scanned(scanner, 1, {5, 5}).empty());
   EXPECT_TRUE(scanned(scanner, 1, {7, 5}).empty());
   EXPECT_TRUE(scanned(scanner, 99, kAll).empty());
-  EXPECT_TRUE(storage::read_heads(database, 1, {5, 5}, storage::all_channels()).empty());
-  EXPECT_TRUE(read_heads(database, 99, kAll, storage::all_channels()).empty());
+  EXPECT_TRUE(storage::read_heads(database, 1, {5, 5}, storage::OverviewChannels{}.set()).empty());
+  EXPECT_TRUE(read_heads(database, 99, kAll, storage::OverviewChannels{}.set()).empty());
 }
 
 TEST_F(SampleScannerTest, AMissingRowIsDamageAndNotASample) {
