@@ -21,6 +21,7 @@ constexpr std::size_t kWorkInATurn = 60;    // of the loop, in messages put into
 constexpr std::size_t kWorkOfARobot = 12;   // to write its state
 constexpr std::int64_t kGatheredUs = 50'000;
 constexpr std::size_t kMaxLog = 64;  // events and commands in one message
+constexpr std::int64_t kProgressIntervalUs = 500'000;
 
 std::int64_t length_us(const station::SampleBatch& batch) {
   return static_cast<std::int64_t>(batch.samples.size()) * batch.context.period_us;
@@ -29,6 +30,17 @@ std::int64_t length_us(const station::SampleBatch& batch) {
 bool continues(const station::SampleBatch& before, const station::SampleBatch& next) {
   return next.boot_id == before.boot_id && next.first_seq == before.next_seq() && next.context == before.context &&
          next.first_robot_time_us == before.first_robot_time_us + static_cast<std::uint64_t>(length_us(before));
+}
+
+// Only numbers have advanced that do so all the time: samples with their "±", times, the estimate of the clock.
+bool is_progress(const station::RobotState& before, const station::RobotState& now) {
+  station::SampleContext context = now.context;
+  context.position_sd_m = before.context.position_sd_m;
+  return before.context == context && before.control == now.control && before.reservation == now.reservation &&
+         before.fluid == now.fluid && before.model == now.model && before.status == now.status &&
+         before.parameters_checksum == now.parameters_checksum && before.changed_limits == now.changed_limits &&
+         before.controller_checksum == now.controller_checksum && before.invalid_values == now.invalid_values &&
+         before.peer == now.peer && before.retired_at_us == now.retired_at_us;
 }
 
 // A message to some: its text is written for the first subscriber, and once for all.
@@ -88,7 +100,11 @@ void LiveFeed::remove(Subscriber& subscriber) {
 void LiveFeed::watch(Subscriber& subscriber, const std::set<station::RobotId>& robots) {
   remove(subscriber);
   filtered_.emplace(&subscriber, robots);
-  for (const station::RobotId& id : robots) robots_[id].watchers.push_back(&subscriber);
+  for (const station::RobotId& id : robots) {
+    Robot& robot = robots_[id];
+    robot.watchers.push_back(&subscriber);
+    robot.published.reset();
+  }
 }
 
 asio::awaitable<void> LiveFeed::run() {
@@ -108,11 +124,7 @@ asio::awaitable<void> LiveFeed::run() {
 // stamp; so do the last of very many, for the stamp itself must not be late.
 asio::awaitable<void> LiveFeed::publish_changed() {
   std::size_t work = 0;
-  std::vector<station::RobotId> due = std::exchange(changed_, {});
-  if (due.size() > kRobotsAStamp) {
-    changed_.assign(std::next(due.begin(), kRobotsAStamp), due.end());
-    due.resize(kRobotsAStamp);
-  }
+  const std::vector<station::RobotId> due = take_due();
   for (const station::RobotId& id : due) {
     const auto robot = robots_.find(id);
     if (robot == robots_.end() || !robot->second.change) continue;
@@ -121,6 +133,26 @@ asio::awaitable<void> LiveFeed::publish_changed() {
     work = 0;
     co_await asio::post(asio::use_awaitable);
   }
+}
+
+bool LiveFeed::is_due(const Robot& robot, const Change& change) const {
+  if (change.to_others || !robot.published) return true;
+  return clock_.steady_us() - robot.published_at_us >= kProgressIntervalUs ||
+         !is_progress(*robot.published, change.state);
+}
+
+// The others wait for a later stamp.
+std::vector<station::RobotId> LiveFeed::take_due() {
+  std::vector<station::RobotId> due;
+  const auto is_taken = [&](const station::RobotId& id) {
+    if (due.size() == kRobotsAStamp) return false;
+    const auto robot = robots_.find(id);
+    if (robot != robots_.end() && robot->second.change && !is_due(robot->second, *robot->second.change)) return false;
+    due.push_back(id);
+    return true;
+  };
+  std::erase_if(changed_, is_taken);
+  return due;
 }
 
 LiveFeed::Headline LiveFeed::headline(const station::RobotState& robot) {
@@ -133,8 +165,12 @@ LiveFeed::Headline LiveFeed::headline(const station::RobotState& robot) {
           robot.stop_path.is_open};
 }
 
-std::size_t LiveFeed::publish_robot(const Robot& robot, const Change& change) {
+std::size_t LiveFeed::publish_robot(Robot& robot, const Change& change) {
   const station::RobotState& state = change.state;
+  if (change.to_watchers) {
+    robot.published = state;
+    robot.published_at_us = clock_.steady_us();
+  }
   Message message{[&] { return dump({{"type", "robot"}, {"robot", to_json(state)}}); }};
   std::size_t published = 0;
   const auto push = [&](Subscriber* to) {

@@ -21,10 +21,11 @@
 
 namespace server::live {
 
-// A page gets the changes of the robots that it watches at once, except small changes of state (with the next stamp)
-// and samples (50 ms of them at a time). A page that has named its robots gets the rest with the next stamp only: the
-// large changes of the other robots, and one `log` of all events and commands. So a page costs the same few messages a
-// second however many robots there are. A lease that was renewed, some ten times a second, is not published.
+// A page gets the changes of the robots that it watches at once, except small changes of state (with the next stamp, or
+// twice a second while only numbers advance) and samples (50 ms of them at a time). A page that has named its robots
+// gets the rest with the next stamp only: the large changes of the other robots, and one `log` of all events and
+// commands. So a page costs the same few messages a second however many robots there are. A lease that was renewed,
+// some ten times a second, is not published.
 class LiveFeed final : public station::StationSink {
  public:
   explicit LiveFeed(runtime::Clock& clock) : clock_{clock} {}
@@ -62,7 +63,9 @@ class LiveFeed final : public station::StationSink {
   struct Robot {
     std::optional<Headline> headline;  // as it was published; none yet: it is watched and has reported nothing
     Subscribers watchers;              // among those that chose
-    std::optional<Change> change;      // since the last stamp
+    std::optional<Change> change;      // that is still to be published
+    std::optional<station::RobotState> published;  // to its watchers, last; none: somebody has begun to watch it since
+    std::int64_t published_at_us = 0;              // steady
     std::optional<station::SampleBatch> gathered;  // under 50 ms of samples
     std::int64_t gathered_since_us = 0;            // steady
     std::string renewal_refusal;                   // why its last lease was not renewed; empty: it was
@@ -75,8 +78,10 @@ class LiveFeed final : public station::StationSink {
   boost::asio::awaitable<void> publish_changed();
   void on_headline(Robot& robot, const station::RobotState& state);
   Change& change_of(Robot& robot, const station::RobotState& state);
+  bool is_due(const Robot& robot, const Change& change) const;
+  std::vector<station::RobotId> take_due();
   void gather(Robot& robot, const station::SampleBatch& batch);
-  std::size_t publish_robot(const Robot& robot, const Change& change);  // returns to how many
+  std::size_t publish_robot(Robot& robot, const Change& change);  // returns to how many
   void publish_gathered(Robot& robot);
   void publish_late_samples();
   void publish_log();

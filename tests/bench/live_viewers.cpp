@@ -1,9 +1,10 @@
 // Many pages that look at robots: WebSockets on /live, each watching one robot, read and thrown away.
 //
-//   live_viewers PORT TOKEN COUNT ROBOTS
+//   live_viewers PORT TOKEN COUNT ROBOTS FIRST
 //
-// Viewer i watches robot sim-((i mod ROBOTS) + 1). Says "ready" when all are connected; ends with its standard input,
-// and prints how many bytes came. Exit status 1 when a viewer is refused or loses its connection.
+// Viewer i, of FIRST, FIRST + 1 and so on, watches robot sim-((i mod ROBOTS) + 1). Says "ready" when all are connected;
+// ends with its standard input, and prints how many bytes came. Exit status 1 when a viewer is refused or loses its
+// connection.
 #include <poll.h>
 #include <sys/socket.h>
 #include <unistd.h>
@@ -47,12 +48,12 @@ int open_viewer(std::uint16_t port, const std::string& token, const std::string&
 }  // namespace
 
 int main(int argc, char** argv) try {
-  if (argc != 5) throw std::runtime_error{"live_viewers PORT TOKEN COUNT ROBOTS"};
+  if (argc != 6) throw std::runtime_error{"live_viewers PORT TOKEN COUNT ROBOTS FIRST"};
   const auto port = static_cast<std::uint16_t>(std::stoi(argv[1]));
-  const int count = std::stoi(argv[3]), robots = std::stoi(argv[4]);
+  const int count = std::stoi(argv[3]), robots = std::stoi(argv[4]), first = std::stoi(argv[5]);
   std::vector<pollfd> waited{{STDIN_FILENO, POLLIN, 0}};
   for (int i = 0; i < count; ++i) {
-    const std::string robot = "sim-" + std::to_string(i % robots + 1);
+    const std::string robot = "sim-" + std::to_string((first + i) % robots + 1);
     waited.push_back({open_viewer(port, argv[2], robot), POLLIN, 0});
   }
   std::cout << "ready" << std::endl;

@@ -5,6 +5,7 @@ import os
 import pathlib
 import subprocess
 import time
+import urllib.request
 
 TICKS_PER_S = os.sysconf("SC_CLK_TCK")
 
@@ -49,3 +50,35 @@ def station(programs, folder, config=""):
     finally:
         process.terminate()
         process.wait()
+
+
+def ask(http, token, method, path, body=None):
+    headers = {"Authorization": f"Bearer {token}", "Content-Type": "application/json"}
+    content = None if body is None else json.dumps(body).encode()
+    request = urllib.request.Request(f"http://{http}/api/v1{path}", content, headers, method=method)
+    return urllib.request.urlopen(request, timeout=30)
+
+
+VIEWERS_OF_A_TOKEN = 30
+
+
+@contextlib.contextmanager
+def viewers(programs, http, count, robots, token=None):
+    """So many pages, each of which watches one robot; they may not lose their connection. Without a token, of the bare
+    loop."""
+    started = []
+    for first in range(0, count, VIEWERS_OF_A_TOKEN):
+        secret = "none"
+        if token:
+            with ask(http, token, "POST", "/tokens", {"name": f"viewers-{first}", "scopes": "read"}) as answer:
+                secret = json.load(answer)["secret"]
+        pages = min(VIEWERS_OF_A_TOKEN, count - first)
+        command = [programs / "live_viewers", http.rpartition(":")[2], secret, str(pages), str(robots), str(first)]
+        started.append(subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True))
+        assert started[-1].stdout.readline() == "ready\n", "a viewer was refused"
+    try:
+        yield
+    finally:
+        for each in started:
+            said, _ = each.communicate()
+            assert each.returncode == 0 and int(said) > 0, "a viewer lost its connection"

@@ -20,6 +20,7 @@ export type RunRecord = Schemas['Run'];
 export type MarkerRecord = Schemas['Marker'];
 export type Overview = Schemas['Overview'];
 export type ParametersInForce = Schemas['ParametersInForce'];
+export type ControllerInForce = Schemas['ControllerInForce'];
 export type Station = Schemas['Station'];
 export type StoredSample = Schemas['StoredSample'];
 export type Recording = Schemas['Recording'];
@@ -80,6 +81,8 @@ export class Api {
     this.command(robot_id, { kind: 'set_mode', mode: 'auto', setpoint_m });
   set_setpoint = (robot_id: string, setpoint_m: number) => this.command(robot_id, { kind: 'set_setpoint', setpoint_m });
   set_duty = (robot_id: string, duty: number) => this.command(robot_id, { kind: 'set_duty', duty });
+  inject_disturbance = (robot_id: string, disturbance_m: number) =>
+    this.command(robot_id, { kind: 'inject_disturbance', disturbance_m });
   zero_position = (robot_id: string) => this.command(robot_id, { kind: 'zero_position' });
   clear_emergency = (robot_id: string, emergency_id: string) =>
     this.command(robot_id, { kind: 'clear_emergency', emergency_id });
@@ -149,6 +152,7 @@ export class Api {
   robot_runs = async (robot_id: string) =>
     (await this.ask<{ runs: RunRecord[] }>('GET', `/runs?robot_id=${encodeURIComponent(robot_id)}&limit=200`)).runs;
   robot_parameters = (robot_id: string) => this.ask<ParametersInForce>('GET', past(robot_id, 'parameters', {}));
+  robot_controller = (robot_id: string) => this.ask<ControllerInForce>('GET', past(robot_id, 'controller', {}));
 
   log_in = (user: string, password: string) => this.ask<Me>('POST', '/login', { user, password });
   log_out = () => this.ask<object>('POST', '/logout');

@@ -11,6 +11,7 @@ import './style/panels.css';
 import './style/readouts.css';
 import './style/vessel.css';
 import './style/charts.css';
+import './style/log_panel.css';
 import './style/plots.css';
 import './style/controls.css';
 import './style/fleet.css';

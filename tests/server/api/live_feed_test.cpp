@@ -73,6 +73,7 @@ TEST_F(LiveFeedTest, SendsLinkModeAndEmergencyAtOnceAndTheRestWithTheNextStamp) 
   live.on_robot(robot);
   EXPECT_EQ(types(), Types{"robot"});
   robot.durable_next_seq = 5;
+  robot.fluid = "water";
   live.on_robot(robot);
   robot.durable_next_seq = 6;
   live.on_robot(robot);
@@ -84,6 +85,46 @@ TEST_F(LiveFeedTest, SendsLinkModeAndEmergencyAtOnceAndTheRestWithTheNextStamp) 
   robot.context.emergency_id = 9;
   live.on_samples(robot, batch(0));
   EXPECT_EQ(types(), (Types{"robot", "samples"}));
+}
+
+TEST_F(LiveFeedTest, WhileOnlyNumbersAdvanceAStateIsSentTwiceASecond) {
+  live.on_robot(robot);
+  received();
+  Types sent;
+  for (int round = 0; round < 20; ++round) {
+    robot.durable_next_seq += 10;
+    robot.context.position_sd_m = 0.001F * static_cast<float>(round);
+    live.on_robot(robot);
+    clock.run_for(100ms);
+    for (const auto& message : received()) {
+      if (message["type"] == "robot") EXPECT_EQ(message["robot"]["durable_next_seq"], robot.durable_next_seq);
+      sent.push_back(message["type"]);
+    }
+  }
+  EXPECT_EQ(std::ranges::count(sent, "robot"), 4);
+  EXPECT_EQ(std::ranges::count(sent, "stamp"), 20);
+  robot.control.holder = "user:ada";
+  live.on_robot(robot);
+  clock.run_for(100ms);
+  EXPECT_EQ(received()[0]["robot"]["control"]["holder"], "user:ada") << "of what people wait for, with the next stamp";
+  robot.next_seq += 5;  // and the last of it is not forgotten
+  live.on_robot(robot);
+  clock.run_for(600ms);
+  EXPECT_EQ(std::ranges::count(types(), "robot"), 1);
+}
+
+// A page that begins to watch does not wait for the half second of another.
+TEST_F(LiveFeedTest, WhoBeginsToWatchReceivesTheNextChangeWithTheNextStamp) {
+  live.watch(listener, {"r1"});
+  live.on_robot(robot);
+  clock.run_for(100ms);
+  live::Subscriber other{loop};
+  live.watch(other, {"r1"});
+  robot.next_seq += 5;
+  live.on_robot(robot);
+  clock.run_for(100ms);
+  EXPECT_EQ(other.size(), 2U) << "state and stamp";
+  live.remove(other);
 }
 
 TEST_F(LiveFeedTest, NeverSendsAnOlderStateAfterANewerOne) {
@@ -313,6 +354,7 @@ TEST_F(LiveFeedTest, OfEachRobotOneStateWaits) {
   live.on_robot(other);
   for (std::uint64_t seq = 1; seq <= 10; ++seq) {
     robot.durable_next_seq = seq;
+    robot.invalid_values = seq;  // published with the next stamp
     live.on_robot(robot);
     clock.run_for(100ms);
   }
@@ -383,8 +425,9 @@ TEST_F(LiveFeedTest, WhatChangesBetweenTwoTurnsIsSentAfterwards) {
   while (messages.empty() && loop.poll_one() > 0) listen();
   ASSERT_LT(messages.size(), fleet.size());
   fleet.front().durable_next_seq = fleet.back().durable_next_seq = 7;
-  live.on_robot(fleet.front());  // was sent: again with the next stamp
-  live.on_robot(fleet.back());   // was not: once, as it is now
+  fleet.front().fluid = "water";  // more than progress, which would wait
+  live.on_robot(fleet.front());   // was sent: again with the next stamp
+  live.on_robot(fleet.back());    // was not: once, as it is now
   clock.settle();
   listen();
   EXPECT_EQ(messages.size(), fleet.size());

@@ -1,9 +1,11 @@
 // Who is in control of the robot, for everybody who looks; for operators the ways to take, to ask for and to give it.
 
+import { useSignal } from '@preact/signals';
 import type { ControlBody } from '../api';
 import type { Robot } from '../robot';
 import type { Session } from '../session';
-import { OutcomeLine, useAsking } from './request';
+import { GuardedButton } from './hold_button';
+import { OutcomeLine, useAsking, type Asking } from './request';
 
 export function ControlLine({ session, robot }: { session: Session; robot: Robot }) {
   const asking = useAsking();
@@ -14,6 +16,8 @@ export function ControlLine({ session, robot }: { session: Session; robot: Robot
   const may_command = session.me.value?.role !== 'viewer';
   const change = (action: ControlBody['action'], what: string) =>
     void asking.ask(what, () => session.api.change_control(robot_id, { action }));
+  const force = (reason: string) =>
+    void asking.ask('Take control by force', () => session.api.change_control(robot_id, { action: 'force', reason }));
   const key = (id: string, text: string, action: ControlBody['action'], what: string, is_asked = false) => (
     <button
       type="button"
@@ -54,7 +58,45 @@ export function ControlLine({ session, robot }: { session: Session; robot: Robot
           'Ask',
           control.wished_by === me,
         )}
+      {is_current && control !== null && !is_mine && session.me.value?.role === 'admin' && (
+        <ForceControl holder={control.holder} asking={asking} on_force={(reason) => force(reason)} />
+      )}
       <OutcomeLine asking={asking} />
+    </div>
+  );
+}
+
+// For administrators: with a reason, which is kept, and by holding the button.
+function ForceControl(props: { holder: string; asking: Asking; on_force(reason: string): void }) {
+  const is_open = useSignal(false);
+  const reason = useSignal('');
+  if (!is_open.value) {
+    return (
+      <button type="button" id="open-force-control" onClick={() => (is_open.value = true)}>
+        Take by force …
+      </button>
+    );
+  }
+  return (
+    <div class="force-control">
+      <label for="force-reason">Why control is taken from {props.holder}</label>
+      <input
+        id="force-reason"
+        autoComplete="off"
+        maxLength={200}
+        value={reason.value}
+        onInput={(event) => (reason.value = event.currentTarget.value)}
+      />
+      <GuardedButton
+        id="force-control"
+        disabled={reason.value.trim() === '' || props.asking.pending}
+        on_held={() => props.on_force(reason.value.trim())}
+      >
+        Hold to take control
+      </GuardedButton>
+      <button type="button" onClick={() => (is_open.value = false)}>
+        Leave it
+      </button>
     </div>
   );
 }

@@ -8,15 +8,12 @@ import type { LogLine } from '../store';
 export function LogStrip({ session }: { session: Session }) {
   const lines = session.store.log.value;
   return (
-    <section class="log-strip" aria-label="Events and commands">
-      <h2>Log</h2>
-      <ol tabIndex={0}>
-        {lines.length === 0 && <li class="quiet">Nothing yet.</li>}
-        {lines.map((line) => (
-          <Line key={line.key} line={line} />
-        ))}
-      </ol>
-    </section>
+    <ol tabIndex={0} aria-label="Events and commands">
+      {lines.length === 0 && <li class="quiet">Nothing yet.</li>}
+      {lines.map((line) => (
+        <Line key={line.key} line={line} />
+      ))}
+    </ol>
   );
 }
 
@@ -77,7 +74,7 @@ export function describe({ event, command, note, position_sd_m }: LogLine): [ton
   return ['quiet', 'page', note ?? ''];
 }
 
-function arguments_text(values: Record<string, unknown>): string {
+export function arguments_text(values: Record<string, unknown>): string {
   return Object.entries(values)
     .map(([name, value]) => {
       if (typeof value === 'number' && name.endsWith('_m')) return ` ${millimetres(value)} mm`;

@@ -2,8 +2,9 @@
 
 import { AutoControl } from '../parts/auto_control';
 import { ControlLine } from '../parts/control_line';
+import { DisturbanceControl } from '../parts/disturbance_control';
 import { LinkPanel } from '../parts/link_panel';
-import { LogStrip } from '../parts/log_strip';
+import { LogPanel } from '../parts/log_panel';
 import { ManualControl } from '../parts/manual_control';
 import { ModeAnnunciator } from '../parts/mode_annunciator';
 import { Plots } from '../parts/plots';
@@ -41,7 +42,7 @@ export default function RobotView({ session, route }: ViewProps) {
           <Waiting session={session} />
         )}
       </main>
-      <LogStrip session={session} />
+      <LogPanel session={session} robot={is_other ? null : robot} />
     </>
   );
 }
@@ -57,6 +58,7 @@ export function Hands({ session, route }: ViewProps) {
       {may_command ? (
         <>
           <AutoControl key={`auto-${key}`} session={session} robot={robot} />
+          <DisturbanceControl key={`disturbance-${key}`} session={session} robot={robot} />
           <ManualControl key={`manual-${key}`} session={session} robot={robot} />
           <RunControl key={`run-${key}`} session={session} robot={robot} />
         </>

@@ -1,0 +1,62 @@
+// A disturbance: the robot adds a length to the position that its controller sees, as in Figure 7 of the paper.
+
+import { useSignal } from '@preact/signals';
+import { millimetres, parse_millimetres } from '../format';
+import type { Robot } from '../robot';
+import type { Session } from '../session';
+import { OutcomeLine, useAsking } from './request';
+
+export function DisturbanceControl({ session, robot }: { session: Session; robot: Robot }) {
+  const { robot_id, link } = robot.state.value;
+  const { mode, disturbance_m } = robot.readout.value;
+  const draft = useSignal(`${'\u2212'}50.0`);
+  const asking = useAsking();
+  const possible = link === 'connected' && mode === 'auto' && !asking.pending;
+  const wanted_m = parse_millimetres(draft.value);
+  const is_disturbed = disturbance_m !== null && disturbance_m !== 0;
+
+  const inject = (length_m: number | null) => {
+    if (link !== 'connected' || mode !== 'auto') return;
+    if (length_m === null) return asking.fail(`“${draft.value}” is not a length in millimetres.`);
+    const what = length_m === 0 ? 'No disturbance' : `Disturbance of ${millimetres(length_m)} mm`;
+    void asking.ask(what, () => session.api.inject_disturbance(robot_id, length_m));
+  };
+  return (
+    <fieldset class="control disturbance">
+      <legend>Disturbance</legend>
+      <form
+        onSubmit={(event) => {
+          event.preventDefault();
+          inject(wanted_m);
+        }}
+      >
+        <label for="disturbance-entry">Added to what the controller sees</label>
+        <div class="entry">
+          <span class="field">
+            <input
+              id="disturbance-entry"
+              inputMode="decimal"
+              autoComplete="off"
+              value={draft.value}
+              aria-describedby="disturbance-outcome"
+              aria-invalid={wanted_m === null}
+              onInput={(event) => {
+                draft.value = event.currentTarget.value;
+                asking.clear();
+              }}
+            />
+            <span class="unit">mm</span>
+          </span>
+          <button type="submit" id="inject-disturbance" disabled={!possible}>
+            Inject
+          </button>
+          <button type="button" id="end-disturbance" disabled={!possible || !is_disturbed} onClick={() => inject(0)}>
+            End it
+          </button>
+        </div>
+      </form>
+      {mode !== 'auto' && <p class="quiet">Only in auto.</p>}
+      <OutcomeLine asking={asking} id="disturbance-outcome" />
+    </fieldset>
+  );
+}
