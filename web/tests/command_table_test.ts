@@ -1,3 +1,4 @@
+// The commands of a robot as they are listed, and what is in force in words.
 import { expect, test } from 'vitest';
 import type { CommandRecord, ControllerInForce } from '../src/api';
 import { newest_of } from '../src/parts/command_table';

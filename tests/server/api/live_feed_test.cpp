@@ -1,66 +1,14 @@
 // What subscribers hear, and what happens to those who listen too slowly.
 #include "server/live/live_feed.hpp"
 
-#include <gtest/gtest.h>
-
 #include <algorithm>
 
-#include "server/runtime/tasks.hpp"
-#include "tests/server/virtual_clock.hpp"
+#include "tests/server/api/live_feed_fixture.hpp"
 
 namespace server {
 namespace {
 
-using namespace std::chrono_literals;
-using nlohmann::json;
-
-class LiveFeedTest : public ::testing::Test {
- public:
-  LiveFeedTest() {
-    robot.id = "r1";
-    robot.link = station::LinkState::connected;
-    robot.boot_id = 0xfedcba9876543210;
-    robot.context.mode = rheonaut_MODE_MANUAL;
-    robot.context.period_us = 25'000;
-    live.add(listener);
-    tasks.spawn("live feed", live.run());
-  }
-  ~LiveFeedTest() override {
-    tasks.stop();
-    clock.settle();
-  }
-
- protected:
-  std::vector<json> received() {
-    std::vector<json> all;
-    for (live::LiveText text = listener.pop(); text != nullptr; text = listener.pop())
-      all.push_back(json::parse(*text));
-    return all;
-  }
-  std::vector<std::string> types() {
-    std::vector<std::string> all;
-    for (const json& one : received()) all.push_back(one["type"]);
-    return all;
-  }
-  station::SampleBatch batch(std::uint64_t first_seq) const {
-    station::SampleBatch made;
-    made.robot_id = robot.id;
-    made.boot_id = robot.boot_id;
-    made.first_seq = first_seq;
-    made.context = robot.context;
-    made.samples = {{.position_m = 0.1F, .duty = -0.5F}, {.position_m = 0.2F, .impedance_mv = 175}};
-    return made;
-  }
-
-  boost::asio::io_context loop;
-  VirtualClock clock{loop};
-  runtime::TaskGroup tasks{loop};
-  live::LiveFeed live{clock};
-  live::Subscriber listener{loop};
-  station::RobotState robot;
-};
-
-using Types = std::vector<std::string>;
+class LiveFeedTest : public LiveFeedFixture {};
 
 TEST_F(LiveFeedTest, StampsTenTimesASecond) {
   clock.run_for(1s);
