@@ -6,17 +6,22 @@ import type { Session } from '../session';
 import type { LogLine } from '../store';
 
 export function LogStrip({ session }: { session: Session }) {
-  const lines = session.store.log.value;
   return (
     <section class="log-strip" aria-label="Events and commands">
       <h2>Log</h2>
-      <ol tabIndex={0}>
-        {lines.length === 0 && <li class="quiet">Nothing yet.</li>}
-        {lines.map((line) => (
-          <Line key={line.key} line={line} />
-        ))}
-      </ol>
+      <LogLines lines={session.store.log.value} />
     </section>
+  );
+}
+
+export function LogLines({ lines }: { lines: readonly LogLine[] }) {
+  return (
+    <ol tabIndex={0}>
+      {lines.length === 0 && <li class="quiet">Nothing yet.</li>}
+      {lines.map((line) => (
+        <Line key={line.key} line={line} />
+      ))}
+    </ol>
   );
 }
 

@@ -2,7 +2,8 @@
 
 import { useSignal, type Signal } from '@preact/signals';
 import { useCloseOnEscape } from '../keys';
-import { kStrips, type PlotSettings } from './strips';
+import { DerivedChoice } from './derived_choice';
+import { kPredicted, kStrips, type PlotSettings, type Strip } from './strips';
 
 const kSpans = [
   { span_s: 60, text: '1 min' },
@@ -22,19 +23,27 @@ interface BarProps {
   state: Signal<PlotState>;
   note: Signal<string>;
   settings: PlotSettings;
-  on_live(): void;
+  on_live?: () => void; // none where nothing is live
   on_span(span_s: number): void;
   children?: preact.ComponentChildren;
 }
 
 export function PlotBar({ state, note, settings, on_live, on_span, children }: BarProps) {
   const { is_live, span_s, range } = state.value;
-  const { is_utc } = settings.kept.value;
+  const { is_utc, xy } = settings.kept.value;
   return (
     <div class="plot-bar">
-      <button type="button" id="plots-live" class={is_live ? 'live' : 'held'} aria-pressed={is_live} onClick={on_live}>
-        {is_live ? 'Live' : 'Back to live'}
-      </button>
+      {on_live && (
+        <button
+          type="button"
+          id="plots-live"
+          class={is_live ? 'live' : 'held'}
+          aria-pressed={is_live}
+          onClick={on_live}
+        >
+          {is_live ? 'Live' : 'Back to live'}
+        </button>
+      )}
       <div class="spans" role="group" aria-label="How much time the plots show">
         {kSpans.map((span) => (
           <button
@@ -61,6 +70,15 @@ export function PlotBar({ state, note, settings, on_live, on_span, children }: B
       >
         {is_utc ? 'UTC' : 'Local time'}
       </button>
+      <button
+        type="button"
+        id="plots-xy"
+        aria-pressed={xy.is_open}
+        title="Any channel against any other, below the strips"
+        onClick={() => settings.change({ xy: { ...xy, is_open: !xy.is_open } })}
+      >
+        X–Y
+      </button>
       {children}
       <TraceList settings={settings} />
     </div>
@@ -86,7 +104,7 @@ function TraceList({ settings }: { settings: PlotSettings }) {
         <fieldset id="trace-list">
           <legend>Traces, kept in this browser</legend>
           {kStrips.flatMap((strip) =>
-            [...strip.traces].reverse().map(({ name, text, swatch }) => (
+            choices_of(strip).map(({ name, text, swatch }) => (
               <label key={name}>
                 <input
                   type="checkbox"
@@ -100,8 +118,16 @@ function TraceList({ settings }: { settings: PlotSettings }) {
               </label>
             )),
           )}
+          <DerivedChoice settings={settings} />
         </fieldset>
       )}
     </div>
   );
+}
+
+// From the top of the drawing downwards; what was predicted stands below what was estimated.
+function choices_of(strip: Strip): { name: string; text: string; swatch: string }[] {
+  const [first, ...others] = [...strip.traces].reverse();
+  if (!first) return [];
+  return strip.has_predicted ? [first, kPredicted, ...others] : [first, ...others];
 }

@@ -1,0 +1,84 @@
+// What moves a replay: play and pause, steps and jumps, speed, the bar of the whole run, and what is at the moment.
+
+import { clock_time, date_and_time } from '../../../format';
+import { Choice } from '../../../parts/choice';
+import type { Overview } from '../runs_api';
+import { since_text } from '../time_axis';
+import { kSpeeds } from './player';
+import type { Replay } from './replay';
+import { ScrubBar } from './scrub_bar';
+
+interface Props {
+  replay: Replay;
+  whole: Overview;
+  gaps_s: [number, number][];
+  note: string; // of the address
+  out_of_reach: string; // events that the station does not list any more
+}
+
+export function Transport({ replay, whole, gaps_s, note, out_of_reach }: Props) {
+  const { player } = replay;
+  const is_playing = player.is_playing.value;
+  const at_s = player.at_s.value;
+  const speed = player.speed.value;
+  const speeds = [...new Set([...kSpeeds, speed])].sort((a, b) => a - b);
+  const button = (id: string, sign: string, title: string, act: () => void) => (
+    <button type="button" id={id} aria-label={title} title={title} onClick={act}>
+      {sign}
+    </button>
+  );
+  return (
+    <div class="transport" role="group" aria-label="Replay">
+      <div class="transport-row">
+        <span class="transport-buttons">
+          {button('replay-mark-before', '⏮', 'Previous event, marker or gap (Page Up)', () => replay.jump(-1))}
+          {button('replay-step-back', '◂', 'Previous sample (←)', () => replay.step(-1))}
+          <button
+            type="button"
+            id="replay-play"
+            class="primary"
+            aria-pressed={is_playing}
+            title="Space"
+            onClick={() => replay.toggle()}
+          >
+            {is_playing ? 'Pause' : 'Play'}
+          </button>
+          {button('replay-step-on', '▸', 'Next sample (→)', () => replay.step(1))}
+          {button('replay-mark-after', '⏭', 'Next event, marker or gap (Page Down)', () => replay.jump(1))}
+        </span>
+        <Choice
+          id="replay-speed"
+          label="Speed"
+          options={speeds.map((value) => ({ value: String(value), text: `${value} ×` }))}
+          value={String(speed)}
+          on_choose={(value) => player.set_speed(Number(value))}
+        />
+        <output class="moment" id="replay-moment">
+          <b>{since_text(at_s, is_playing ? 1 : 3)}</b>
+          <span class="quiet"> of {since_text(replay.length_s.value)}</span>
+        </output>
+        <time class="moment-clock" id="replay-clock">
+          {date_and_time(replay.at_us.value / 1000).slice(0, 10)} {clock_time(Math.floor(replay.at_us.value / 1000))}
+        </time>
+      </div>
+      <ScrubBar replay={replay} whole={whole} gaps_s={gaps_s} />
+      <p class="transport-note" id="replay-note" role="status">
+        {note_of(replay, gaps_s) || note || out_of_reach}
+      </p>
+    </div>
+  );
+}
+
+// What is to be known of the moment, the most important first.
+function note_of(replay: Replay, gaps_s: readonly [number, number][]): string {
+  const problem = replay.pages.problem.value;
+  if (problem) return `Samples do not come: ${problem} It is tried again each second.`;
+  if (replay.player.is_waiting.value) return 'Waiting for samples: the station does not send them as fast as this.';
+  if (replay.is_unknown.value) return 'The samples of this moment are on their way.';
+  const missing = replay.missing.value;
+  if (!missing) return '';
+  const at_s = replay.player.at_s.value;
+  const gap = gaps_s.find(([from_s, to_s]) => from_s <= at_s && at_s < to_s);
+  const length = gap ? `, ${since_text(gap[1] - gap[0])} long` : '';
+  return `A gap${length}: no sample was recorded here since ${since_text(missing.since_s)}.`;
+}
