@@ -5,7 +5,12 @@ import { useCloseOnEscape } from '../keys';
 import { DerivedChoice } from './derived_choice';
 import { kPredicted, kStrips, type PlotSettings, type Strip } from './strips';
 
-const kSpans = [
+export interface Span {
+  span_s: number;
+  text: string;
+}
+
+const kSpans: readonly Span[] = [
   { span_s: 60, text: '1 min' },
   { span_s: 600, text: '10 min' },
   { span_s: 3600, text: '1 h' },
@@ -25,10 +30,11 @@ interface BarProps {
   settings: PlotSettings;
   on_live?: () => void; // none where nothing is live
   on_span(span_s: number): void;
+  spans?: readonly Span[];
   children?: preact.ComponentChildren;
 }
 
-export function PlotBar({ state, note, settings, on_live, on_span, children }: BarProps) {
+export function PlotBar({ state, note, settings, on_live, on_span, spans = kSpans, children }: BarProps) {
   const { is_live, span_s, range } = state.value;
   const { is_utc, xy } = settings.kept.value;
   return (
@@ -45,7 +51,7 @@ export function PlotBar({ state, note, settings, on_live, on_span, children }: B
         </button>
       )}
       <div class="spans" role="group" aria-label="How much time the plots show">
-        {kSpans.map((span) => (
+        {spans.map((span) => (
           <button
             type="button"
             key={span.span_s}
@@ -75,7 +81,11 @@ export function PlotBar({ state, note, settings, on_live, on_span, children }: B
         id="plots-xy"
         aria-pressed={xy.is_open}
         title="Any channel against any other, below the strips"
-        onClick={() => settings.change({ xy: { ...xy, is_open: !xy.is_open } })}
+        onClick={() => {
+          settings.change({ xy: { ...xy, is_open: !xy.is_open } });
+          // Below the strips it may be out of sight.
+          setTimeout(() => document.getElementById('xy-plot')?.scrollIntoView({ block: 'nearest' }));
+        }}
       >
         X–Y
       </button>

@@ -235,7 +235,12 @@ const kPerSecond: Record<string, string> = { 'mm/s': 'mm/s²', 'mm/s²': 'mm/s³
 export function look_of_derived(spec: DerivedSpec): Pick<Strip, 'unit' | 'value' | 'label' | 'least_span'> {
   const { unit, value, label, least_span = 1 } = look_of(spec.of);
   if (spec.kind !== 'derivative') return { unit, value, label, least_span: least_span / 4 };
-  return { unit: kPerSecond[unit] ?? `${unit}/s`, value, label: value, least_span: least_span / 4 };
+  return {
+    unit: kPerSecond[unit] ?? `${unit}/s`,
+    value,
+    label: (each: number) => value(each),
+    least_span: least_span / 4,
+  };
 }
 
 const derived_strip = (spec: DerivedSpec): Strip => {

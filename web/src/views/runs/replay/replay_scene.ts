@@ -39,7 +39,8 @@ export class ReplayScene extends Scene {
       edge_s: () => replay.at_us.peek() / 1e6,
       is_still: () => !player.is_playing.peek(),
     };
-    const axis = new TimeAxis(settings.kept.peek().span_s);
+    const length_s = Math.max(kLeastShown_s, replay.length_s.peek());
+    const axis = new TimeAxis(Math.min(settings.kept.peek().span_s, round_span_s(length_s)));
     super(source, axis, settings, (scene) => ({
       pan: (by_px) => replay.seek(player.at_s.peek() - (by_px / scene.width_px()) * axis.span_s),
       zoom: (factor) => this.show(axis.span_s * factor),
@@ -63,11 +64,6 @@ export class ReplayScene extends Scene {
     this.redraw();
   }
 
-  choose_span(span_s: number): void {
-    this.settings.change({ span_s });
-    this.show(span_s);
-  }
-
   load_predictions(from_us: number, to_us: number): Promise<void> {
     return this.predicted.look({ from_s: from_us / 1e6, to_s: to_us / 1e6 }, null);
   }
@@ -75,4 +71,21 @@ export class ReplayScene extends Scene {
   show_state(): void {
     this.state.value = { is_live: true, span_s: this.axis.span_s, range: '' };
   }
+}
+
+const kSpans = [
+  { span_s: 10, text: '10 s' },
+  { span_s: 60, text: '1 min' },
+  { span_s: 600, text: '10 min' },
+  { span_s: 3600, text: '1 h' },
+];
+
+// A round time that has room for the whole run.
+const round_span_s = (length_s: number) =>
+  [5, 10, 20, 30, 60].find((span_s) => span_s >= length_s) ?? Math.ceil(length_s / 60) * 60;
+
+// Those that are shorter than the run, and the whole of it.
+export function spans_of(length_s: number): { span_s: number; text: string }[] {
+  const whole_s = round_span_s(Math.max(kLeastShown_s, length_s));
+  return [...kSpans.filter(({ span_s }) => span_s < whole_s), { span_s: whole_s, text: 'Whole run' }];
 }

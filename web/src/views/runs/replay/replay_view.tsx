@@ -23,7 +23,7 @@ import { PastVessel } from './past_vessel';
 import { at_text, parse_address } from './player';
 import { lines_of, marks_of, Replay, type Extent } from './replay';
 import { act_of, is_taken, type Act } from './replay_keys';
-import { ReplayScene } from './replay_scene';
+import { ReplayScene, spans_of } from './replay_scene';
 import { Transport } from './transport';
 import { useCommands } from './use_commands';
 
@@ -136,7 +136,8 @@ function OneReplay({ session, page, route, run, extent }: Props & { run: Run; ex
               state={scene.state}
               note={scene.note}
               settings={plot_settings}
-              on_span={(span_s) => scene.choose_span(span_s)}
+              spans={spans_of(replay.length_s.value)}
+              on_span={(span_s) => scene.show(span_s)}
             />
             <StripHost
               scene={scene}

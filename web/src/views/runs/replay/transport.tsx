@@ -8,6 +8,11 @@ import { kSpeeds } from './player';
 import type { Replay } from './replay';
 import { ScrubBar } from './scrub_bar';
 
+const kMarkBefore = 'M3 3h2v10h-2zM14 3v10l-8-5z';
+const kStepBack = 'M11 3v10l-7-5zM12 3h1.5v10h-1.5z';
+const kStepOn = 'M5 3v10l7-5zM2.5 3h1.5v10h-1.5z';
+const kMarkAfter = 'M13 3h-2v10h2zM2 3v10l8-5z';
+
 interface Props {
   replay: Replay;
   whole: Overview;
@@ -22,17 +27,19 @@ export function Transport({ replay, whole, gaps_s, note, out_of_reach }: Props) 
   const at_s = player.at_s.value;
   const speed = player.speed.value;
   const speeds = [...new Set([...kSpeeds, speed])].sort((a, b) => a - b);
-  const button = (id: string, sign: string, title: string, act: () => void) => (
+  const button = (id: string, path: string, title: string, act: () => void) => (
     <button type="button" id={id} aria-label={title} title={title} onClick={act}>
-      {sign}
+      <svg viewBox="0 0 16 16" aria-hidden="true">
+        <path d={path} />
+      </svg>
     </button>
   );
   return (
     <div class="transport" role="group" aria-label="Replay">
       <div class="transport-row">
         <span class="transport-buttons">
-          {button('replay-mark-before', '⏮', 'Previous event, marker or gap (Page Up)', () => replay.jump(-1))}
-          {button('replay-step-back', '◂', 'Previous sample (←)', () => replay.step(-1))}
+          {button('replay-mark-before', kMarkBefore, 'Previous event, marker or gap (Page Up)', () => replay.jump(-1))}
+          {button('replay-step-back', kStepBack, 'Previous sample (←)', () => replay.step(-1))}
           <button
             type="button"
             id="replay-play"
@@ -43,8 +50,8 @@ export function Transport({ replay, whole, gaps_s, note, out_of_reach }: Props) 
           >
             {is_playing ? 'Pause' : 'Play'}
           </button>
-          {button('replay-step-on', '▸', 'Next sample (→)', () => replay.step(1))}
-          {button('replay-mark-after', '⏭', 'Next event, marker or gap (Page Down)', () => replay.jump(1))}
+          {button('replay-step-on', kStepOn, 'Next sample (→)', () => replay.step(1))}
+          {button('replay-mark-after', kMarkAfter, 'Next event, marker or gap (Page Down)', () => replay.jump(1))}
         </span>
         <Choice
           id="replay-speed"
