@@ -37,7 +37,9 @@ const choose = async (field, option) => {
 
 // Points at a share of the width of the plots, and gives what a strip says there.
 async function value_at(share, strip = '.strip-0') {
-  const { x, y, width, height } = await page.locator(`${strip} .plot`).boundingBox();
+  const plot = page.locator(`${strip} .plot`);
+  await plot.scrollIntoViewIfNeeded();
+  const { x, y, width, height } = await plot.boundingBox();
   await page.mouse.move(x + 58 + share * (width - 58 - 18), y + height / 2);
   await page.waitForTimeout(200);
   return text(`${strip} .cursor`);

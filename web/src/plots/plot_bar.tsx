@@ -68,29 +68,31 @@ export function PlotBar({ state, note, settings, on_live, on_span, spans = kSpan
       <output class="plot-note" id="plots-note">
         {note}
       </output>
-      <button
-        type="button"
-        id="plots-clock"
-        title="The clock of the time axis"
-        onClick={() => settings.change({ is_utc: !is_utc })}
-      >
-        {is_utc ? 'UTC' : 'Local time'}
-      </button>
-      <button
-        type="button"
-        id="plots-xy"
-        aria-pressed={xy.is_open}
-        title="Any channel against any other, below the strips"
-        onClick={() => {
-          settings.change({ xy: { ...xy, is_open: !xy.is_open } });
-          // Below the strips it may be out of sight.
-          setTimeout(() => document.getElementById('xy-plot')?.scrollIntoView({ block: 'nearest' }));
-        }}
-      >
-        X–Y
-      </button>
-      {children}
-      <TraceList settings={settings} />
+      <div class="plot-choices">
+        <button
+          type="button"
+          id="plots-clock"
+          title="The clock of the time axis"
+          onClick={() => settings.change({ is_utc: !is_utc })}
+        >
+          {is_utc ? 'UTC' : 'Local time'}
+        </button>
+        <button
+          type="button"
+          id="plots-xy"
+          aria-pressed={xy.is_open}
+          title="Any channel against any other, below the strips"
+          onClick={() => {
+            settings.change({ xy: { ...xy, is_open: !xy.is_open } });
+            // Below the strips it may be out of sight.
+            setTimeout(() => document.getElementById('xy-plot')?.scrollIntoView({ block: 'nearest' }));
+          }}
+        >
+          X–Y
+        </button>
+        {children}
+        <TraceList settings={settings} />
+      </div>
     </div>
   );
 }

@@ -1,11 +1,11 @@
 // One channel against another: a point for each sample, breaks where samples are missing, the newest last.
 import { expect, test } from 'vitest';
 import type { Tile } from '../../src/plots/past';
-import { kMostPoints, XyPoints } from '../../src/plots/xy';
+import { kMostPoints, XyPoints, type XySource } from '../../src/plots/xy';
 import { SampleRing } from '../../src/samples';
 import { batch } from '../fakes';
 
-function filled(ring: SampleRing, from_s: number, to_s: number, past: never | null = null) {
+function filled(ring: SampleRing, from_s: number, to_s: number, past: XySource['past'] = null) {
   const points = new XyPoints();
   points.fill({ rows: ring, shift_s: 0, past }, { from_s, to_s }, 'position_m', 'duty');
   return points;
@@ -42,7 +42,7 @@ test('where the page has no samples those of the recording are points, and extre
     ({
       visit: (_a: number, _b: number, _c: number, point: (tile: Tile, at: number) => void) =>
         time_s.forEach((_, at) => point(shown, at)),
-    }) as never;
+    }) as unknown as XySource['past'];
   expect(filled(new SampleRing(64), 0, 2, visited(tile(time_s, time_s))).size).toBe(3);
   expect(filled(new SampleRing(64), 0, 2, visited(tile(time_s, time_s.slice()))).size).toBe(0);
 });

@@ -146,7 +146,7 @@ test('marks on each other are one, the most important; the outline breaks where 
     [at(9), at(19), at(509)],
   ];
   const position_m = { min: [0, 0, 0], max: [1, 1, 1] };
-  const path = outline_of({ first_utc_us, last_utc_us, samples: [10, 10, 10], position_m } as never, 10);
+  const path = outline_of({ first_utc_us, last_utc_us, position_m } as never, 10, 0.015);
   expect(path.match(/M/g)).toHaveLength(2);
 });
 

@@ -15,7 +15,7 @@ export function ScrubBar({ replay, whole, gaps_s }: { replay: Replay; whole: Ove
   const at_s = replay.player.at_s.value;
   const share = (time_s: number) => `${(Math.min(1, Math.max(0, time_s / length_s)) * 100).toFixed(3)}%`;
   const marks = useMemo(() => thinned(replay.marks.value, length_s), [replay.marks.value, length_s]);
-  const outline = useMemo(() => outline_of(whole, length_s), [whole, length_s]);
+  const outline = useMemo(() => outline_of(whole, length_s, replay.reel.gap_s), [whole, length_s]);
   const seek = (event: PointerEvent) => {
     const { left, width } = (bar.current as HTMLDivElement).getBoundingClientRect();
     replay.seek(((event.clientX - left) / width) * length_s);
@@ -70,7 +70,11 @@ export function thinned(marks: readonly Mark[], length_s: number): Mark[] {
 }
 
 // The least and the largest position of each point as one surface, with a break where nothing is recorded.
-export function outline_of({ first_utc_us, last_utc_us, position_m, samples }: Overview, length_s: number): string {
+export function outline_of(
+  { first_utc_us, last_utc_us, position_m }: Overview,
+  length_s: number,
+  gap_s: number,
+): string {
   const [low, high] = [position_m?.min ?? [], position_m?.max ?? []];
   const known = [...low, ...high].filter((value): value is number => value !== null);
   if (known.length === 0) return '';
@@ -85,14 +89,12 @@ export function outline_of({ first_utc_us, last_utc_us, position_m, samples }: O
   let is_down = false;
   for (let at = 0; at < first_utc_us.length; ++at) {
     const [min, max] = [low[at] ?? null, high[at] ?? null];
-    const period_us =
-      ((last_utc_us[at] as number) - (first_utc_us[at] as number)) / Math.max(1, (samples[at] ?? 1) - 1);
     const step_us = at > 0 ? (first_utc_us[at] as number) - (last_utc_us[at - 1] as number) : 0;
     if (min === null || max === null) {
       is_down = false;
       continue;
     }
-    if (period_us > 0 && step_us > 3 * period_us) is_down = false;
+    if (step_us > gap_s * 1e6) is_down = false;
     pieces.push(
       `${is_down ? 'L' : 'M'}${x(first_utc_us[at] as number)} ${y(min)}L${x(last_utc_us[at] as number)} ${y(max)}`,
     );
