@@ -43,6 +43,7 @@ function OpenXyPlot({ scene }: { scene: Scene }) {
       if (host.width !== width || host.height !== height) [host.width, host.height] = [width, height];
       const { past } = scene.source;
       points.fill({ rows: scene.rows, shift_s: scene.source.shift_s(), past }, scene.view, xy.x, xy.y);
+      past.end(); // what it lacks of the past is asked for
       ranges.x = next_range(ranges.x, ...points.x_range, x_look.least_span ?? 1);
       ranges.y = next_range(ranges.y, ...points.y_range, y_look.least_span ?? 1);
       const style = getComputedStyle(host);

@@ -4,6 +4,7 @@ import type { CommandRecord, EventRecord, StoredSample } from '../../src/api';
 import { lines_of, marks_of, Replay, type Mark } from '../../src/views/runs/replay/replay';
 import { act_of, is_taken } from '../../src/views/runs/replay/replay_keys';
 import { outline_of, thinned } from '../../src/views/runs/replay/scrub_bar';
+import { why_missing } from '../../src/views/runs/replay/losses';
 import { spans_of } from '../../src/views/runs/replay/replay_scene';
 import { settle } from '../fakes';
 import { at, kOrigin_us, kPeriod_us, samples } from './made';
@@ -46,6 +47,7 @@ test('a moment in a gap says since when nothing was recorded', async () => {
   await settle();
   expect(replay.readout.value.stale).toBe(true);
   expect(replay.missing.value?.since_s).toBeCloseTo(4.99, 6);
+  expect(replay.missing.value?.until_s).toBeCloseTo(9, 6);
 });
 
 test('steps go from sample to sample, and pause it', async () => {
@@ -175,4 +177,15 @@ test('a field keeps its keys, and a button its Space', () => {
 test('the plots offer spans that are shorter than the run, and the whole of it', () => {
   expect(spans_of(15).map(({ span_s }) => span_s)).toEqual([10, 20]);
   expect(spans_of(610).at(-1)).toEqual({ span_s: 660, text: 'Whole run' });
+});
+
+test('of a gap it is said whether its samples are lost, on their way, or were never made', () => {
+  const hole = { boot_id: '11', seq: 299 };
+  const gap = { robot_id: 'a', boot_id: '11', first_seq: 300, last_seq: 499, cause: 'ring_overrun', noticed_at_us: 0 };
+  const losses = (change: object) => ({ gaps: [], missing: [], is_whole: true, ...change }) as never;
+  expect(why_missing(hole, losses({ gaps: [gap] }))).toBe('200 samples are lost for good (ring overrun).');
+  expect(why_missing(hole, losses({ missing: [gap] }))).toMatch(/^200 samples are not here yet/);
+  expect(why_missing(hole, losses({ gaps: [{ ...gap, boot_id: '12' }] }))).toMatch(/^The robot made none/);
+  expect(why_missing(hole, losses({ is_whole: false }))).toBe('');
+  expect(why_missing(hole, null)).toBe('');
 });

@@ -86,6 +86,8 @@ export class RunPage {
     await this.load_window();
   }
 
+  losses = () => this.api.losses(this.run_id);
+
   stop(): void {
     this.turn += 1;
     this.cancel.abort();

@@ -5,10 +5,11 @@ import type { CommandRecord, EventRecord } from '../../../api';
 import { kNothingRead } from '../../../robot';
 import type { LogLine } from '../../../store';
 import type { Moment } from '../moments';
+import type { Hole } from './losses';
 import { Pages, type PageWays } from './pages';
 import { readout_at } from './past_readout';
 import { Player } from './player';
-import { Reel, type Situation } from './reel';
+import { Reel, type Row, type Situation } from './reel';
 
 const kReadout_ms = 100; // between two readings while it plays
 const kShownLines = 60;
@@ -32,7 +33,7 @@ export class Replay {
   readonly pages: Pages;
   readonly readout = signal(kNothingRead);
   readonly situation = signal<Situation | null>(null);
-  readonly missing = signal<{ since_s: number } | null>(null); // the moment lies in a gap
+  readonly missing = signal<Hole | null>(null); // the moment lies in a gap
   readonly is_unknown = signal(true); // the samples of the moment have not come yet
   readonly lines = signal<readonly LogLine[]>([]); // that have happened, the newest first
   readonly marks = signal<readonly Mark[]>([]);
@@ -153,10 +154,22 @@ export class Replay {
       this.readout.value = is_known ? readout_at(row, utc_us, this.reel.gap_s) : kNothingRead;
       this.situation.value = is_known ? (row?.situation ?? null) : null;
       const is_missing = is_known && this.readout.peek().stale;
-      const since_s = row ? this.seconds_of(row.utc_us) : 0;
-      if (this.missing.peek()?.since_s !== since_s || !is_missing) this.missing.value = is_missing ? { since_s } : null;
+      this.tell_hole(row, utc_us, is_missing);
       this.tell_lines();
     });
+  }
+
+  private tell_hole(before: Row | null, utc_us: number, is_missing: boolean): void {
+    if (!is_missing) return void (this.missing.value = null);
+    const after = this.reel.next_to(utc_us, 1, this.extent.last_us + 1);
+    const hole = {
+      since_s: before ? this.seconds_of(before.utc_us) : 0,
+      until_s: after !== null && typeof after !== 'number' ? this.seconds_of(after.utc_us) : null,
+      boot_id: before?.situation.boot_id ?? '',
+      seq: before?.seq ?? -1,
+    };
+    const known = this.missing.peek();
+    if (known?.since_s !== hole.since_s || known.until_s !== hole.until_s) this.missing.value = hole;
   }
 
   private tell_lines(): void {

@@ -25,7 +25,7 @@ import { lines_of, marks_of, Replay, type Extent } from './replay';
 import { act_of, is_taken, type Act } from './replay_keys';
 import { ReplayScene, spans_of } from './replay_scene';
 import { Transport } from './transport';
-import { useCommands } from './use_commands';
+import { useCommands, useLosses } from './use_what_is_listed';
 
 const kAddress_ms = 1000; // between two changes of the address while it plays
 
@@ -110,6 +110,7 @@ function OneReplay({ session, page, route, run, extent }: Props & { run: Run; ex
   useClock(replay);
   useKeys(replay);
   const { gaps_s, out_of_reach } = useWhatHappened(session, page, run, replay, scene, extent);
+  const losses = useLosses(session, page);
   const now = replay.readout.value;
   const situation = replay.situation.value;
   const whole = page.whole.value;
@@ -119,7 +120,16 @@ function OneReplay({ session, page, route, run, extent }: Props & { run: Run; ex
       run_id={run.run_id}
       run={run}
       transport={
-        whole && <Transport replay={replay} whole={whole} gaps_s={gaps_s} note={asked} out_of_reach={out_of_reach} />
+        whole && (
+          <Transport
+            replay={replay}
+            whole={whole}
+            gaps_s={gaps_s}
+            note={asked}
+            losses={losses}
+            out_of_reach={out_of_reach}
+          />
+        )
       }
     >
       <div class="replay-stage">
@@ -180,21 +190,25 @@ function useReplay(session: Session, page: RunPage, run: Run, extent: Extent) {
 
 // The address says where it begins, and follows: at each pause, and once a second while it plays. Gives what is wrong in it.
 function useAddress(replay: Replay, { query }: Route): string {
-  const said = useRef('');
+  const followed = useRef<string | null>(null); // the address that was last followed or written
+  const shown = useRef(''); // what it led to: as long as that stays, so does what was typed
   const asked = parse_address(query, replay.length_s.value);
   const { player } = replay;
+  const key_of = (at = '', speed = '') => `${at} ${speed}`;
+  const now = () => ({ at: at_text(player.at_s.peek()), speed: String(player.speed.peek()) });
   useEffect(() => {
-    const key = `${query['at'] ?? ''} ${query['speed'] ?? ''}`;
-    if (key === said.current) return;
-    said.current = key;
+    const key = key_of(query['at'], query['speed']);
+    if (key === followed.current) return;
+    followed.current = key;
     if (asked.speed !== null) player.set_speed(asked.speed);
     replay.seek(asked.at_s ?? 0);
+    shown.current = key_of(now().at, now().speed);
   }, [replay, query['at'], query['speed']]);
   const write = () => {
-    const next = { at: at_text(player.at_s.peek()), speed: String(player.speed.peek()) };
-    const key = `${next.at} ${next.speed}`;
-    if (key === said.current) return;
-    said.current = key;
+    const next = now();
+    const key = key_of(next.at, next.speed);
+    if (key === shown.current) return;
+    followed.current = shown.current = key;
     change_query(next);
   };
   const is_playing = player.is_playing.value;

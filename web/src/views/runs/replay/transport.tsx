@@ -2,8 +2,9 @@
 
 import { clock_time, date_and_time } from '../../../format';
 import { Choice } from '../../../parts/choice';
-import type { Overview } from '../runs_api';
+import type { Losses, Overview } from '../runs_api';
 import { since_text } from '../time_axis';
+import { why_missing } from './losses';
 import { kSpeeds } from './player';
 import type { Replay } from './replay';
 import { ScrubBar } from './scrub_bar';
@@ -18,10 +19,11 @@ interface Props {
   whole: Overview;
   gaps_s: [number, number][];
   note: string; // of the address
+  losses: Losses | null;
   out_of_reach: string; // events that the station does not list any more
 }
 
-export function Transport({ replay, whole, gaps_s, note, out_of_reach }: Props) {
+export function Transport({ replay, whole, gaps_s, note, losses, out_of_reach }: Props) {
   const { player } = replay;
   const is_playing = player.is_playing.value;
   const at_s = player.at_s.value;
@@ -70,22 +72,22 @@ export function Transport({ replay, whole, gaps_s, note, out_of_reach }: Props) 
       </div>
       <ScrubBar replay={replay} whole={whole} gaps_s={gaps_s} />
       <p class="transport-note" id="replay-note" role="status">
-        {note_of(replay, gaps_s) || note || out_of_reach}
+        {note_of(replay, losses) || note || out_of_reach}
       </p>
     </div>
   );
 }
 
 // What is to be known of the moment, the most important first.
-function note_of(replay: Replay, gaps_s: readonly [number, number][]): string {
+function note_of(replay: Replay, losses: Losses | null): string {
   const problem = replay.pages.problem.value;
   if (problem) return `Samples do not come: ${problem} It is tried again each second.`;
   if (replay.player.is_waiting.value) return 'Waiting for samples: the station does not send them as fast as this.';
   if (replay.is_unknown.value) return 'The samples of this moment are on their way.';
   const missing = replay.missing.value;
   if (!missing) return '';
-  const at_s = replay.player.at_s.value;
-  const gap = gaps_s.find(([from_s, to_s]) => from_s <= at_s && at_s < to_s);
-  const length = gap ? `, ${since_text(gap[1] - gap[0])} long` : '';
-  return `A gap${length}: no sample was recorded here since ${since_text(missing.since_s)}.`;
+  const { since_s, until_s } = missing;
+  const length = until_s === null ? '' : `, ${since_text(until_s - since_s)} long`;
+  const why = why_missing(missing, losses);
+  return `A gap${length}: no sample was recorded here since ${since_text(since_s)}. ${why}`.trim();
 }

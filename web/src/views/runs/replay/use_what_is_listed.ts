@@ -1,10 +1,11 @@
-// The commands of a robot in the time of a run, as far as the station lists them.
+// The commands of a robot in the time of a run, as far as the station lists them, and what is not there of its samples.
 
 import { useSignal } from '@preact/signals';
 import { useEffect } from 'preact/hooks';
 import type { CommandRecord } from '../../../api';
 import type { Session } from '../../../session';
-import type { Run } from '../runs_api';
+import type { RunPage } from '../run_page';
+import type { Losses, Run } from '../runs_api';
 
 const kListed = 1000; // the newest
 
@@ -25,4 +26,19 @@ export function useCommands(session: Session, run: Run): { commands: readonly Co
     commands: commands.value,
     out_of_reach: commands.value.length >= kListed && oldest_us > run.started_at_us,
   };
+}
+
+export function useLosses(session: Session, page: RunPage): Losses | null {
+  const losses = useSignal<Losses | null>(null);
+  const is_live = session.phase.value === 'live';
+  useEffect(() => {
+    let is_wanted = true;
+    if (is_live)
+      void page.losses().then(
+        (found) => is_wanted && (losses.value = found),
+        () => undefined,
+      );
+    return () => void (is_wanted = false);
+  }, [session, page, page.run.value?.state, is_live]);
+  return losses.value;
 }
