@@ -1,9 +1,13 @@
-// The plots alone, with ten minutes of made-up samples at 100 Hz in eight traces, for plots_bench.mjs. Never built into dist.
+// The plots alone, with ten minutes of made-up samples at 100 Hz in eight traces, for plots_bench.mjs and heap_bench.mjs.
+// Never built into dist.
+//
+// ?rate=10: samples come ten times as fast as they are made. ?more=1: with a computed trace and the X–Y plot as well.
 
 import '../src/styles';
 import { render } from 'preact';
 import type { RobotState, SamplesMessage } from '../src/api';
 import { Plots, plot_settings } from '../src/parts/plots';
+import { column_of } from '../src/plots/derived';
 import { Session } from '../src/session';
 
 const kHz = 100;
@@ -39,8 +43,17 @@ function samples(first_seq: number): SamplesMessage {
   };
 }
 
+const asked = new URLSearchParams(location.search);
+const rate = Number(asked.get('rate') ?? 1);
+if (asked.has('more')) {
+  plot_settings.add_derived({ kind: 'derivative', of: 'position_m', window_s: 0.2 });
+  plot_settings.change({ xy: { is_open: true, x: 'position_m', y: 'velocity_m_s' } });
+}
 plot_settings.change({
-  traces: ['position', 'seen', 'setpoint', 'reference', 'velocity', 'acceleration', 'duty', 'impedance'],
+  traces: [
+    ...['position', 'seen', 'setpoint', 'reference', 'velocity', 'acceleration', 'duty', 'impedance'],
+    ...plot_settings.kept.peek().derived.map(column_of),
+  ],
   span_s: 600,
 });
 const session = new Session();
@@ -48,13 +61,18 @@ const state = { robot_id: 'rheo-1', link: 'connected', mode: 'auto', clock: null
 session.store.receive({ type: 'welcome', actor: '', version: '', utc_us: 0, stamp_us: 0, robots: [state] });
 const robot = session.store.robots.value[0]!;
 robot.ring.grow(65_536);
-const start_ms = performance.now() - (kPast / kHz) * 1000;
+const start_ms = performance.now();
 let seq = 0;
+const page = window as unknown as { fed_s: number };
 const feed = (now_ms: number) => {
-  for (; (seq + kBatch) / kHz <= (now_ms - start_ms) / 1000; seq += kBatch)
-    robot.receive(samples(seq), start_ms + ((seq + kBatch) / kHz) * 1000);
+  const due_s = kPast / kHz + (rate * (now_ms - start_ms)) / 1000;
+  for (; (seq + kBatch) / kHz <= due_s; seq += kBatch) {
+    const behind_ms = rate === 1 ? 1000 * (due_s - (seq + kBatch) / kHz) : 0;
+    robot.receive(samples(seq), now_ms - behind_ms);
+  }
+  page.fed_s = seq / kHz - kPast / kHz;
 };
-feed(performance.now());
+feed(start_ms);
 setInterval(() => feed(performance.now()), (1000 * kBatch) / kHz);
 render(
   <div class="cockpit of-robot">

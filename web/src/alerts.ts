@@ -6,6 +6,7 @@ import type { ViewSettings } from './settings';
 
 export interface AlertWays {
   beep(): void;
+  chime(): void; // softer: a value beyond a threshold of this browser
   notify(title: string, text: string): void;
   ask(): Promise<boolean>; // whether the browser may notify
 }
@@ -29,6 +30,10 @@ export class Alerts {
     if (on) this.ways.beep();
   }
 
+  chime(): void {
+    if (this.settings.sound.on.peek()) this.ways.chime();
+  }
+
   async set_notification(on: boolean): Promise<void> {
     this.problem.value = '';
     const may = on && (await this.ways.ask());
@@ -47,14 +52,17 @@ export class Alerts {
   }
 }
 
-// Three short tones, made by the browser itself. It plays none before the first press on a page.
+// Three short tones of an alarm, two lower ones of a threshold, made by the browser itself. It plays none before the first
+// press on a page.
 export function browser_alerts(): AlertWays {
   let audio: AudioContext | null = null;
+  const play = (frequency_hz: number, at: readonly number[]) => {
+    const context = (audio ??= new AudioContext());
+    void context.resume().then(() => at.forEach((at_s) => tone(context, frequency_hz, context.currentTime + at_s)));
+  };
   return {
-    beep() {
-      audio ??= new AudioContext();
-      void audio.resume().then(() => [0, 0.22, 0.44].forEach((at_s) => audio && tone(audio, audio.currentTime + at_s)));
-    },
+    beep: () => play(880, [0, 0.22, 0.44]),
+    chime: () => play(587, [0, 0.22]),
     notify(title, text) {
       try {
         new Notification(title, { body: text, tag: 'rheonaut', icon: '/favicon_emergency.svg' });
@@ -69,9 +77,9 @@ export function browser_alerts(): AlertWays {
   };
 }
 
-function tone(audio: AudioContext, at_s: number): void {
+function tone(audio: AudioContext, frequency_hz: number, at_s: number): void {
   const [source, loudness] = [audio.createOscillator(), audio.createGain()];
-  source.frequency.value = 880;
+  source.frequency.value = frequency_hz;
   loudness.gain.setValueAtTime(0, at_s);
   loudness.gain.linearRampToValueAtTime(0.25, at_s + 0.01);
   loudness.gain.setValueAtTime(0.25, at_s + 0.12);

@@ -208,7 +208,8 @@ export class Api {
       headers['Content-Type'] = 'application/json';
       options.body = JSON.stringify(body);
     }
-    const answer = await this.fetch(`/api/v1${path}`, options).catch(() => {
+    const answer = await this.fetch(`/api/v1${path}`, options).catch((error: unknown) => {
+      if (error instanceof ApiError) throw error; // the page itself has refused it
       throw new ApiError('The station did not answer.', 0);
     });
     const content = (await answer.json().catch(() => null)) as unknown;

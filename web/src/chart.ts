@@ -9,10 +9,10 @@ import { paint_band, paint_trace, type Pen, type Plane } from './plots/trace_pai
 import type { TraceWindow } from './plots/trace_window';
 import { clock_label, clock_splits, type Stretch } from './plots/time_axis';
 import { next_range, range_splits } from './range';
-import type { Column } from './samples';
+import type { AnyColumn } from './samples';
 
 export interface Trace {
-  column: Column;
+  column: AnyColumn;
   colour: string; // name of a CSS variable
   width_px: number;
   dash_px?: number[];
@@ -20,8 +20,8 @@ export interface Trace {
 
 // A surface between two columns, drawn below all traces; the range does not follow it.
 export interface Band {
-  low: Column;
-  high: Column;
+  low: AnyColumn;
+  high: AnyColumn;
   colour: string; // name of a CSS variable
 }
 
@@ -33,6 +33,13 @@ export interface StripOptions {
   least_span?: number; // of a range that follows the data
   splits?: number[];
   is_large?: boolean;
+  backdrop?: Backdrop;
+}
+
+// What is drawn below the traces on a time grid of its own, and how far it reaches.
+export interface Backdrop {
+  range(view: Stretch): [number, number] | null;
+  paint(context: CanvasRenderingContext2D, plane: Plane, view: Stretch): void;
 }
 
 export interface Painters {
@@ -81,8 +88,9 @@ export class StripChart {
     Object.assign(this, { view, is_live, zone_s });
     if (!options.fixed_range) {
       const ranged = this.at.slice(this.edges);
-      const low = Math.min(...ranged.map((c) => window.low[c] as number));
-      const high = Math.max(...ranged.map((c) => window.high[c] as number));
+      const more = options.backdrop?.range(view) ?? [Infinity, -Infinity];
+      const low = Math.min(more[0], ...ranged.map((c) => window.low[c] as number));
+      const high = Math.max(more[1], ...ranged.map((c) => window.high[c] as number));
       this.range = next_range(this.range, low, high, options.least_span ?? 1);
     }
     this.plot.batch(() => {
@@ -169,6 +177,7 @@ export class StripChart {
     context.beginPath();
     context.rect(box.left, box.top, box.width, box.height);
     context.clip();
+    this.options.backdrop?.paint(context, plane, view);
     if (edges > 0) paint_band(context, window, this.at[0] as number, this.at[1] as number, plane, spread);
     pens.forEach((pen, at) => paint_trace(context, window, this.at[at + edges] as number, plane, pen));
     context.restore();
@@ -189,7 +198,7 @@ export class StripChart {
     const last = this.window.size - 1;
     if (last < 0 || !this.is_live) return;
     const time_s = this.window.time_s[last] as number;
-    const value = this.window.value_at(this.options.traces.at(-1)?.column as Column, last);
+    const value = this.window.value_at(this.options.traces.at(-1)?.column as AnyColumn, last);
     if (time_s < this.view.to_s - 0.5 || value === null) return;
     const ratio = devicePixelRatio;
     u.ctx.save(); // uPlot remembers what it has set, and sets nothing twice

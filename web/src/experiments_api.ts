@@ -1,6 +1,6 @@
 // What the page asks the station about experiments, their profiles, and reservations of robots.
 
-import type { Fluid, RunRecord } from './api';
+import type { Fluid, RunRecord, StoredSample } from './api';
 import type { components } from './api_types';
 import { kOpenStates, type ExperimentSummary } from './experiments_store';
 
@@ -56,6 +56,15 @@ export class ExperimentsApi {
   one = (experiment_id: number) => this.ask<Experiment>('GET', `/experiments/${experiment_id}`);
   prediction = (experiment_id: number, run: number) =>
     this.ask<Prediction>('GET', `/experiments/${experiment_id}/runs/${run}/prediction`);
+
+  // What the plots of a robot ask for.
+  predictions_of = (robot_id: string) => ({
+    experiments: async () => (await this.page(robot_id, null)).experiments,
+    one: this.one,
+    prediction: this.prediction,
+    first_sample: async (run_id: number) =>
+      (await this.ask<{ samples: StoredSample[] }>('GET', `/runs/${run_id}/samples?limit=1`)).samples[0] ?? null,
+  });
 
   begin = (body: ExperimentBody) => this.ask<Experiment>('POST', '/experiments', body);
   pause = (experiment_id: number) => this.act(experiment_id, 'pause');

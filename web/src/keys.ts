@@ -82,12 +82,16 @@ export const kShortcuts: readonly { keys: string[]; what: string }[] = [
     keys: ['Esc'],
     what: 'Stops the robot that the red button names; without one, every robot. From every field, list and panel; what is open closes as well.',
   },
-  { keys: ['Space'], what: 'Never stops. It belongs to “Hold to run” and to text.' },
+  { keys: ['Space'], what: 'Never stops. It belongs to “Hold to run” and to text; in a replay it plays and pauses.' },
   {
     keys: ['Enter'],
     what: 'Presses the button that has the focus, the stop as well; in a field it sends what was typed.',
   },
   { keys: ['↑', '↓'], what: 'Choose in a list; letters search in it.' },
+  {
+    keys: ['←', '→', 'Page Up', 'Page Down'],
+    what: 'In a replay: the sample before and after; what happened before and after. + and − change its speed.',
+  },
   {
     keys: ['Shift', 'right click'],
     what: 'The browser’s own menu. While it is open the browser keeps Escape: press the red button.',

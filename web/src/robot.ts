@@ -59,7 +59,7 @@ export interface Readout {
   missing: number; // samples that this page has not got, since it first received this boot
 }
 
-const kEmptyReadout: Readout = {
+export const kNothingRead: Readout = {
   watched: true,
   estimate_m: null,
   position_m: null,
@@ -108,7 +108,7 @@ export class Robot {
     if (this.is_left_out.value) return false;
     return mode === 'emergency' || emergency_id !== null || (pending_stop !== null && !this.is_away.value);
   });
-  readonly readout = signal<Readout>(kEmptyReadout);
+  readonly readout = signal<Readout>(kNothingRead);
   readonly mode = computed(() => this.state.value.mode);
   readonly emergency_id = computed(() => this.state.value.emergency_id);
   // Connected, and its samples do not come.
@@ -254,6 +254,6 @@ export class Robot {
     this.shown = { state, is_current };
     const { mode, sub_state, emergency_id, link } = state;
     const stale = link !== 'connected' || !is_current;
-    this.readout.value = { ...kEmptyReadout, watched: false, mode, sub_state, emergency_id, stale };
+    this.readout.value = { ...kNothingRead, watched: false, mode, sub_state, emergency_id, stale };
   }
 }

@@ -21,6 +21,23 @@ export const kColumns = [
   'round_trip_us',
 ] as const;
 export type Column = (typeof kColumns)[number];
+export type DerivedColumn = `=${string}`; // computed from others: plots/derived.ts
+export type AnyColumn = Column | DerivedColumn;
+
+// What plots read samples from: rows in order of time, of which some may be missing. Row i lies in slot i % capacity.
+export interface SampleRows {
+  readonly capacity: number;
+  readonly period_s: number;
+  readonly gap_s: number; // rows further apart than this are not joined
+  readonly time_s: Float64Array;
+  readonly first_index: number;
+  readonly next_index: number;
+  readonly epoch: number; // changes when rows that were read are others now
+  rewritten_from: number; // the lowest index that was written since somebody set it to Infinity
+  holds(index: number): boolean;
+  column(name: AnyColumn): Float64Array;
+}
+export const kNoColumn = new Float64Array(0);
 
 // Where the robot believes that it is: what its controller sees, less the disturbance that was injected. null: not known.
 export function estimate_of(
@@ -33,11 +50,13 @@ export function estimate_of(
 }
 
 // Consecutive samples further apart than this many periods are not joined by a line.
-const kGapPeriods = 1.5;
+export const kGapPeriods = 1.5;
 // How fast the right edge may fall back when samples come later than they used to, in s per s.
 const kEdgeRelaxation = 0.02;
 
-export class SampleRing {
+export class SampleRing implements SampleRows {
+  readonly epoch = 0;
+  rewritten_from = Infinity;
   capacity: number;
   time_s: Float64Array;
   columns: Record<Column, Float64Array>;
@@ -90,6 +109,7 @@ export class SampleRing {
       this.lead_s = -Infinity;
     }
     const first = this.base + batch.first_seq;
+    this.rewritten_from = Math.min(this.rewritten_from, first);
     const spread_m = batch.position_sd_m === null ? NaN : kSpread_sd * batch.position_sd_m;
     for (let i = 0; i < size; ++i) {
       const index = first + i;
@@ -129,6 +149,9 @@ export class SampleRing {
   }
   holds(index: number): boolean {
     return index >= 0 && this.slot_index[index % this.capacity] === index;
+  }
+  column(name: AnyColumn): Float64Array {
+    return this.columns[name as Column] ?? kNoColumn;
   }
   get gap_s(): number {
     return kGapPeriods * this.period_s;

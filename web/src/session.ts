@@ -17,6 +17,7 @@ import { Alerts, browser_alerts } from './alerts';
 import { DutyHold } from './duty_hold';
 import { EmergencyStop, kIdleStop } from './emergency';
 import { ExperimentsApi } from './experiments_api';
+import { is_refused_in_past, shows_past } from './past_guard';
 import { go_to, route } from './route';
 import { kCurrent_ms, LiveLink, type LinkPhase, type Surroundings } from './live';
 import { StationPath } from './station_path';
@@ -147,6 +148,7 @@ export class Session {
   // The robot of the address is the one that is selected, and the one that is selected stands in the address.
   private follow_route(): void {
     const { view, parts } = route.value;
+    if (shows_past(route.value)) untracked(() => this.hold.release()); // SAFETY: no hand holds a duty in the past
     if (view !== 'robot') return;
     const asked_id = parts[0];
     // SAFETY: an address is followed when it changes, never because something else has: a press must not move the selection.
@@ -182,6 +184,9 @@ export class Session {
 
   // Whatever is sent to a robot goes to the one that is selected, which stays so.
   private ask(path: string, options: RequestInit): Promise<Response> {
+    // SAFETY: beside the past that is shown nothing commands a robot; a stop is sent.
+    if (is_refused_in_past(route.peek(), options.method ?? 'GET', path, options.body))
+      return Promise.reject(new ApiError('A replay is shown: nothing is sent to robots from here but a stop.', 0));
     if (options.method === 'POST' && path.startsWith('/api/v1/robots/')) this.store.keep_selected();
     return fetch(path, options);
   }
@@ -292,7 +297,7 @@ export class Session {
 
   private renew_lease(robot_id: string): boolean {
     const { link } = this;
-    if (!link.stamp_is_fresh() || link.stamp_us === null) return false;
+    if (!link.stamp_is_fresh() || link.stamp_us === null || shows_past(route.peek())) return false;
     return link.send({ type: 'renew_lease', robot_id, stamp_us: link.stamp_us });
   }
 

@@ -83,6 +83,7 @@ class KeptSwitch {
 export class ViewSettings {
   readonly sound: KeptSwitch; // of a new alarm
   readonly notification: KeptSwitch;
+  readonly threshold_mute: KeptSwitch; // thresholds are silent where alarms sound
   readonly hidden_robots: KeptSet;
   readonly dismissed: KeptSet;
 
@@ -91,6 +92,7 @@ export class ViewSettings {
     this.dismissed = new KeptSet(shelf, 'rheonaut.dismissed', kMaxDismissed);
     this.sound = new KeptSwitch(shelf, 'rheonaut.sound');
     this.notification = new KeptSwitch(shelf, 'rheonaut.notification');
+    this.threshold_mute = new KeptSwitch(shelf, 'rheonaut.threshold_mute');
   }
 }
 

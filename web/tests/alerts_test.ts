@@ -16,6 +16,7 @@ function alerts_with(may_notify = true) {
   };
   const alerts = new Alerts(new ViewSettings(shelf), {
     beep: () => void done.push('beep'),
+    chime: () => void done.push('chime'),
     notify: (_, text) => void done.push(text),
     ask: () => Promise.resolve(may_notify),
   });

@@ -1,7 +1,9 @@
 // The latch of a robot, named by its time and cause, and the guarded way out of it.
 
 import { age } from '../format';
+import { shows_past } from '../past_guard';
 import type { Robot } from '../robot';
+import { format, route } from '../route';
 import type { Session } from '../session';
 import { GuardedButton } from './hold_button';
 import { OutcomeLine, useAsking } from './request';
@@ -43,7 +45,13 @@ export function Latch({ session, robot }: { session: Session; robot: Robot }) {
         </p>
       )}
       {stale && Number.isFinite(sample_age_ms) && <p>Last sample {age(sample_age_ms)} ago.</p>}
-      {known_id !== null && pending_stop === null && (
+      {known_id !== null && pending_stop === null && shows_past(route.value) && (
+        <p class="may-clear">
+          A replay is shown. <a href={format({ view: 'robot', parts: [robot_id] })}>Open {robot_id}</a> to clear it.
+        </p>
+      )}
+      {/* SAFETY: beside a replay there is no control of a robot but the stop. */}
+      {known_id !== null && pending_stop === null && !shows_past(route.value) && (
         <>
           <WhoMayClear session={session} robot={robot} />
           {/* SAFETY: of another emergency it is another button: a hold that began before it clears nothing. */}

@@ -5,8 +5,9 @@ import { kWaysOut, sentence } from '../reasons';
 import type { Session } from '../session';
 import type { LogLine } from '../store';
 
-export function LogStrip({ session }: { session: Session }) {
-  const lines = session.store.log.value;
+export const LogStrip = ({ session }: { session: Session }) => <LogLines lines={session.store.log.value} />;
+
+export function LogLines({ lines }: { lines: readonly LogLine[] }) {
   return (
     <ol tabIndex={0} aria-label="Events and commands">
       {lines.length === 0 && <li class="quiet">Nothing yet.</li>}

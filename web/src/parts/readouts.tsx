@@ -8,13 +8,14 @@ import type { Robot } from '../robot';
 import type { Channel } from '../thresholds';
 import { alerts_of } from './threshold_list';
 
-export function Readouts({ robot }: { robot: Robot }) {
+// Of a robot that is looked at, or of a run that is replayed.
+export function Readouts({ robot, label = 'Measured now' }: { robot: Pick<Robot, 'readout'>; label?: string }) {
   const now = robot.readout.value;
   const beyond = (channel: Channel) =>
     !now.stale && alerts_of(robot).alerts.value.some((alert) => alert.channel === channel && alert.is_beyond);
   const silent = Number.isFinite(now.sample_age_ms) ? `no sample for ${age(now.sample_age_ms)}` : 'no sample yet';
   return (
-    <section class={`readouts ${now.stale ? 'stale' : ''}`} aria-label="Measured now">
+    <section class={`readouts ${now.stale ? 'stale' : ''}`} aria-label={label}>
       <Numeral
         name="Position, estimated"
         unit="mm"

@@ -1,11 +1,12 @@
 // Thresholds of this browser: a list to set them, and a line that announces what is beyond one until it is acknowledged.
 
 import { useSignal } from '@preact/signals';
-import { useEffect } from 'preact/hooks';
+import { useEffect, useMemo } from 'preact/hooks';
 import { clock_time, milliseconds_of_us, millimetres, millimetres_per_s, millivolts, percent } from '../format';
 import { useCloseOnEscape } from '../keys';
 import type { Robot } from '../robot';
 import type { Session } from '../session';
+import { ThresholdSound } from '../threshold_sound';
 import { browser_shelf } from '../settings';
 import { Alerts, kChannels, Thresholds, type Alert, type Channel } from '../thresholds';
 
@@ -26,9 +27,9 @@ const kShown: Record<Channel, Shown> = {
 };
 
 export const thresholds = new Thresholds(browser_shelf());
-const of_robots = new WeakMap<Robot, Alerts>();
+const of_robots = new WeakMap<object, Alerts>();
 
-export function alerts_of(robot: Robot): Alerts {
+export function alerts_of(robot: object): Alerts {
   let alerts = of_robots.get(robot);
   if (!alerts) of_robots.set(robot, (alerts = new Alerts()));
   return alerts;
@@ -46,10 +47,21 @@ export function AlertLine({ session, robot }: { session: Session; robot: Robot }
   const now = robot.readout.value;
   const ranges = thresholds.ranges.value;
   const round_trip_us = robot.state.value.clock?.round_trip_us ?? null;
+  const { sound, threshold_mute } = session.settings;
+  const warning = useMemo(
+    () =>
+      new ThresholdSound({
+        is_on: () => sound.on.peek(),
+        is_muted: () => threshold_mute.on.peek(),
+        chime: () => session.alerts.chime(),
+      }),
+    [session, robot],
+  );
   useEffect(() => {
     // SAFETY: an old value is not judged as if it were of now.
     if (now.stale || !session.store.is_current.peek()) return;
     alerts.judge(ranges, { ...now, round_trip_us }, Date.now());
+    warning.follow(alerts.alerts.peek(), performance.now());
   }, [now, ranges]);
   const announced = alerts.alerts.value.filter((alert) => !alert.is_acknowledged);
   if (announced.length === 0) return null;
@@ -62,6 +74,16 @@ export function AlertLine({ session, robot }: { session: Session; robot: Robot }
           </li>
         ))}
       </ul>
+      {sound.on.value && (
+        <button
+          type="button"
+          id="mute-alerts"
+          aria-pressed={threshold_mute.on.value}
+          onClick={() => threshold_mute.set(!threshold_mute.on.peek())}
+        >
+          {threshold_mute.on.value ? 'Muted' : 'Mute'}
+        </button>
+      )}
       <button type="button" id="acknowledge-alerts" onClick={() => alerts.acknowledge()}>
         Acknowledge
       </button>
@@ -76,7 +98,7 @@ function sentence({ channel, worst, limit, since_ms, is_beyond }: Alert): string
   return `${title} ${side} ${text(limit)} ${unit} ${when}, up to ${text(worst)}${is_beyond ? '' : '; over now'}`;
 }
 
-export function ThresholdList() {
+export function ThresholdList({ session }: { session: Session }) {
   const open = useSignal(false);
   useCloseOnEscape(() => (open.value = false));
   const set = Object.keys(thresholds.ranges.value).length;
@@ -101,9 +123,30 @@ export function ThresholdList() {
           {kChannels.map((channel) => (
             <ThresholdRow key={channel} channel={channel} />
           ))}
+          <SoundChoice session={session} />
         </div>
       )}
     </div>
+  );
+}
+
+// Thresholds are heard where alarms are, unless somebody wants to hear alarms alone.
+function SoundChoice({ session }: { session: Session }) {
+  const { sound, threshold_mute } = session.settings;
+  return (
+    <label class="threshold-sound">
+      <input
+        type="checkbox"
+        autoComplete="off"
+        id="threshold-sound"
+        checked={!threshold_mute.on.value}
+        onChange={(event) => threshold_mute.set(!event.currentTarget.checked)}
+      />
+      <span>
+        A value that goes beyond one sounds
+        {!sound.on.value && <span class="quiet">, once sounds are on (in the list of alarms)</span>}
+      </span>
+    </label>
   );
 }
 

@@ -5,16 +5,16 @@
 
 import { useSignal } from '@preact/signals';
 import { useEffect, useMemo, useRef } from 'preact/hooks';
-import { next_range, range_splits, round_step } from '../range';
-import { kSpread_sd, m_to_millimetres, millimetres } from '../format';
+import { next_range } from '../range';
+import { m_to_millimetres, millimetres } from '../format';
 import { useCloseOnEscape } from '../keys';
 import type { Robot } from '../robot';
 import type { Session } from '../session';
 import { Coast, kNothingKnown, known_of, type Known } from '../vessel/coast';
 import { Ghost, why_not, type Bounds } from '../vessel/ghost';
 import { OutcomeLine, useAsking } from './request';
+import { kLeastSpan_m, Scale, Tube, TubePlaces } from './tube';
 
-const kLeastSpan_m = 0.3;
 const kLeastCoast_m = 0.001; // less is not worth a second robot
 const kHint = 'Drag the magenta handle, or move it by keys, to send another setpoint.';
 const kKeys_m: Record<string, number> = {
@@ -28,7 +28,7 @@ const kKeys_m: Record<string, number> = {
 
 export function Vessel({ session, robot }: { session: Session; robot: Robot }) {
   const now = robot.readout.value;
-  const { estimate_m, position_m, position_sd_m, setpoint_m, reference_m, stale } = now;
+  const { estimate_m, position_m, setpoint_m, stale } = now;
   const known = useKnown(session, robot);
   const coast = useMemo(() => known.model && new Coast(known.model), [known]);
   const rest_m = resting_place(robot, coast);
@@ -58,10 +58,8 @@ export function Vessel({ session, robot }: { session: Session; robot: Robot }) {
     const shown = [estimate_m, position_m, setpoint_m, rest_m].filter((value) => value !== null);
     range.current = next_range(range.current, Math.min(...shown, 0), Math.max(...shown, 0), kLeastSpan_m);
   }
-  const [from_m, to_m] = range.current;
-  const share = (value_m: number) => Math.max(0, Math.min(1, (value_m - from_m) / (to_m - from_m)));
-  const place = (value_m: number) => `${(share(value_m) * 100).toFixed(3)}%`;
-  const spread_m = kSpread_sd * (position_sd_m ?? 0);
+  const places = new TubePlaces(range.current);
+  const { from_m, to_m } = places;
 
   const move_to = (value_m: number) => {
     ghost.move(value_m, bounds);
@@ -100,22 +98,12 @@ export function Vessel({ session, robot }: { session: Session; robot: Robot }) {
   const shown_m = target_m.value ?? setpoint_m;
   return (
     <section class={`vessel ${stale ? 'stale' : ''} ${reason ? '' : 'free'}`} aria-label="Where the robot is">
-      <div class="tube" ref={tube} title="One tube, open at both ends; the robot is not to scale">
-        <Limit at_m={known.position_min_m} side="low" place={place} range={range.current} />
-        <Limit at_m={known.position_max_m} side="high" place={place} range={range.current} />
-        {estimate_m !== null && spread_m > 0 && (
-          <u style={{ left: place(estimate_m - spread_m), right: `calc(100% - ${place(estimate_m + spread_m)})` }} />
-        )}
-        {reference_m !== null && setpoint_m !== null && <i class="reference" style={{ left: place(reference_m) }} />}
-        {setpoint_m !== null && <i class="in-force" style={{ left: place(setpoint_m) }} />}
-        {position_m !== null && position_m !== estimate_m && <i class="seen" style={{ left: place(position_m) }} />}
-        {rest_m !== null && <Swimmer class="rest" left={place(rest_m)} />}
-        {estimate_m !== null && <Swimmer class="here" left={place(estimate_m)} />}
+      <Tube host={tube} places={places} now={now} limits={known} rest_m={rest_m}>
         {shown_m !== null && (
           <div
             class={`ghost ${target_m.value === null ? '' : 'moved'}`}
             id="setpoint-ghost"
-            style={{ left: place(shown_m) }}
+            style={{ left: places.at(shown_m) }}
             role="slider"
             tabIndex={0}
             aria-label="Setpoint. Arrow keys move it, Enter sends it"
@@ -141,8 +129,8 @@ export function Vessel({ session, robot }: { session: Session; robot: Robot }) {
             {target_m.value !== null && <output>{millimetres(target_m.value, 0)}</output>}
           </div>
         )}
-      </div>
-      <Scale range={range.current} place={place} />
+      </Tube>
+      <Scale places={places} />
       <div class="vessel-foot">
         <span id="ghost-note" class={complaint.value ? 'caution' : ''} role={complaint.value ? 'status' : undefined}>
           {target_m.value !== null
@@ -216,46 +204,4 @@ function useKnown(session: Session, robot: Robot): Known {
     return () => void (is_wanted = false);
   }, [robot, phase, parameters_checksum, boot_id]);
   return known.value;
-}
-
-interface LimitProps {
-  at_m: number | null;
-  side: 'low' | 'high';
-  place(value_m: number): string;
-  range: [number, number];
-}
-
-// A wall where motion ends in an emergency; out of sight it is named at the end of the tube.
-function Limit({ at_m, side, place, range: [from_m, to_m] }: LimitProps) {
-  if (at_m === null) return null;
-  const is_out = at_m < from_m || at_m > to_m;
-  if (is_out) return <span class={`limit-out ${side}`}>limit {millimetres(at_m, 0)}</span>;
-  const style = side === 'low' ? { right: `calc(100% - ${place(at_m)})` } : { left: place(at_m) };
-  return <span class={`limit ${side}`} style={style} title={`Position limit ${millimetres(at_m, 0)} mm`} />;
-}
-
-const Swimmer = ({ class: name, left }: { class: string; left: string }) => (
-  <svg class={`swimmer ${name}`} style={{ left }} viewBox="-22 -11 44 22" aria-hidden="true">
-    <path d="M-21 0q4 -7 8 0t8 0" />
-    <rect x="-6" y="-6" width="25" height="12" rx="6" />
-    <line x1="0" y1="-11" x2="0" y2="11" />
-  </svg>
-);
-
-function Scale({ range, place }: { range: [number, number]; place(value_m: number): string }) {
-  const [from_m, to_m] = range;
-  const step_m = round_step((to_m - from_m) / 5) / 5;
-  const minor = Array.from({ length: Math.floor((to_m - from_m) / step_m) + 1 }, (_, i) => from_m + i * step_m);
-  return (
-    <div class="vessel-scale" aria-hidden="true">
-      {minor.map((value_m) => (
-        <s key={value_m} style={{ left: place(value_m) }} />
-      ))}
-      {range_splits(range).map((value_m) => (
-        <b key={value_m} style={{ left: place(value_m) }}>
-          <span>{Math.round(m_to_millimetres(value_m))}</span>
-        </b>
-      ))}
-    </div>
-  );
 }

@@ -1,21 +1,22 @@
 // The least and the largest values of each 16 consecutive samples of a ring, computed once: so that ten minutes of samples
 // can be drawn anew thirty times a second.
 
-import type { Column, SampleRing } from '../samples';
+import type { AnyColumn, SampleRows } from '../samples';
 
 export const kBlock = 16;
 
 export class Blocks {
   readonly min: Float64Array[] = []; // of each column, by slot
   readonly max: Float64Array[] = [];
-  private of: SampleRing | null = null;
+  private of: SampleRows | null = null;
   private capacity = 0;
+  private epoch = 0;
   private held = new Float64Array(0); // which block a slot holds
 
-  constructor(private readonly names: readonly Column[]) {}
+  constructor(private readonly names: readonly AnyColumn[]) {}
 
   // Where the block that begins with this sample is; -1 when not all of it is there, or when it is interrupted.
-  slot_of(ring: SampleRing, first_index: number): number {
+  slot_of(ring: SampleRows, first_index: number): number {
     this.fit(ring);
     const block = first_index / kBlock;
     const slot = block % this.held.length;
@@ -25,7 +26,7 @@ export class Blocks {
     const from = first_index % ring.capacity;
     this.names.forEach((name, c) => {
       let [min, max] = [Infinity, -Infinity];
-      const values = ring.columns[name];
+      const values = ring.column(name);
       for (let at = from; at < from + kBlock; ++at) {
         const value = values[at] as number;
         if (value < min) min = value;
@@ -38,9 +39,9 @@ export class Blocks {
     return slot;
   }
 
-  private fit(ring: SampleRing): void {
-    if (this.of === ring && this.capacity === ring.capacity) return;
-    [this.of, this.capacity] = [ring, ring.capacity];
+  private fit(ring: SampleRows): void {
+    if (this.of === ring && this.capacity === ring.capacity && this.epoch === ring.epoch) return;
+    [this.of, this.capacity, this.epoch] = [ring, ring.capacity, ring.epoch];
     const size = Math.floor(ring.capacity / kBlock);
     this.held = new Float64Array(size).fill(-1);
     this.names.forEach((_, c) => {
@@ -50,7 +51,7 @@ export class Blocks {
   }
 }
 
-function is_whole(ring: SampleRing, first_index: number): boolean {
+function is_whole(ring: SampleRows, first_index: number): boolean {
   if (ring.capacity % kBlock !== 0 || first_index + kBlock > ring.next_index) return false;
   for (let index = first_index; index < first_index + kBlock; ++index) if (!ring.holds(index)) return false;
   const from = first_index % ring.capacity;

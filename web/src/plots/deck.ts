@@ -2,22 +2,24 @@
 // for each change while they are held, and never while the page is hidden.
 
 import { StripChart, kAxis_px, kRight_px, type Box, type Painters, type StripOptions } from '../chart';
-import type { SampleRing } from '../samples';
+import type { AnyColumn } from '../samples';
+import type { DerivedRows } from './derived';
 import type { Marks } from './marks';
 import type { Past } from './past';
 import type { Stretch, TimeAxis } from './time_axis';
 import { TraceWindow } from './trace_window';
-import type { Column } from '../samples';
 
 const kFrame_ms = 1000 / 32; // a little less than a thirtieth of a second, on the average of the frames
 const kMostBins = 1000;
 const kFewMarks = 24; // more are drawn as ticks alone
 
 export interface DeckSource {
-  ring: SampleRing;
+  rows: DerivedRows;
   past: Past | null;
   marks: Marks;
-  shift_s(): number; // UTC less the ring's times
+  shift_s(): number; // UTC less the times of the rows
+  edge_s(page_ms: number): number; // UTC at the right edge of plots that run
+  is_still(): boolean; // the edge stands: what is drawn stays as it is
   zone_s(): number; // the axis' clock less UTC
 }
 
@@ -35,12 +37,12 @@ export class Deck {
     private readonly host: HTMLElement,
     private readonly axis: TimeAxis,
     private readonly source: DeckSource,
-    columns: readonly Column[],
+    columns: readonly AnyColumn[],
     private readonly on_drawn: () => void,
   ) {
     this.window = new TraceWindow(4 * kMostBins, columns);
     this.read_colours();
-    this.now_s = this.edge_s(performance.now());
+    this.now_s = source.edge_s(performance.now());
     this.frame = requestAnimationFrame(this.tick);
   }
 
@@ -84,24 +86,22 @@ export class Deck {
     for (const chart of this.charts) chart.destroy();
   }
 
-  private edge_s(page_ms: number): number {
-    return this.source.ring.edge_s(page_ms / 1000) + this.source.shift_s();
-  }
-
   private readonly tick = (page_ms: number): void => {
     this.frame = requestAnimationFrame(this.tick);
-    this.now_s = this.edge_s(page_ms);
-    if (page_ms < this.due_ms || !(this.axis.is_live || this.is_dirty)) return;
+    this.now_s = this.source.edge_s(page_ms);
+    const runs = this.axis.is_live && !this.source.is_still();
+    if (page_ms < this.due_ms || !(runs || this.is_dirty)) return;
     this.due_ms = Math.max(this.due_ms + kFrame_ms, page_ms - kFrame_ms);
     this.is_dirty = false;
     this.draw();
   };
 
   private draw(): void {
-    const { ring, past } = this.source;
+    const { rows, past } = this.source;
     const view = this.view;
+    rows.update();
     past?.begin();
-    this.window.fill({ ring, shift_s: this.source.shift_s(), past }, view, Math.min(kMostBins, this.width_px));
+    this.window.fill({ ring: rows, shift_s: this.source.shift_s(), past }, view, Math.min(kMostBins, this.width_px));
     past?.end();
     for (const chart of this.charts) chart.draw(view, this.axis.is_live, this.source.zone_s());
     this.frames += 1;

@@ -6,8 +6,9 @@
 
 import type { Overview, StoredSample } from '../api';
 import { kSpread_sd } from '../format';
-import { estimate_of, type Column } from '../samples';
+import { estimate_of, kGapPeriods, type AnyColumn, type Column } from '../samples';
 import { kSampleFields } from '../telemetry_fields';
+import { column_of, DerivedRows, lead_s, ListRows, type DerivedSpec } from './derived';
 
 export const kTilePoints = 600;
 const kSamplesTile_s = 10;
@@ -30,7 +31,7 @@ export interface Tile {
   known_to_s: number; // it has what was recorded until then
   first_s: Float64Array; // of each point: when its first sample was made, and its last
   last_s: Float64Array;
-  columns: Partial<Record<Column, Extremes>>;
+  columns: Partial<Record<AnyColumn, Extremes>>;
 }
 
 export interface PastWays {
@@ -56,11 +57,24 @@ export class Past {
   private wanted: { level: number; number: number }[] = [];
   private under_way = 0;
   private is_closed = false;
+  private derived: readonly DerivedSpec[] = [];
 
+  // `least_level`: 1 where whoever asks has the samples themselves from elsewhere.
   constructor(
     private readonly ways: PastWays,
     private readonly on_change: () => void,
+    private readonly least_level = 0,
   ) {}
+
+  // What is computed of samples. Tiles of samples are asked for anew.
+  derive(specs: readonly DerivedSpec[]): void {
+    if (JSON.stringify(specs) === JSON.stringify(this.derived)) return;
+    this.derived = specs;
+    for (const key of [...this.tiles.keys()].filter((each) => each.startsWith('0/'))) {
+      this.tiles.delete(key);
+      this.asked_at_s.delete(key);
+    }
+  }
 
   get is_loading(): boolean {
     return this.under_way > 0;
@@ -82,7 +96,7 @@ export class Past {
 
   // Calls `point` for each point within the stretch, in order of time.
   visit(from_s: number, to_s: number, bin_s: number, point: (tile: Tile, at: number) => void): void {
-    const level = level_of(bin_s);
+    const level = Math.max(this.least_level, level_of(bin_s));
     const span_s = tile_span_s(level);
     for (let number = Math.floor(from_s / span_s); number * span_s < to_s; ++number) {
       const [start_s, end_s] = [Math.max(from_s, number * span_s), Math.min(to_s, (number + 1) * span_s)];
@@ -129,27 +143,34 @@ export class Past {
     const span_s = tile_span_s(level);
     const [from_s, to_s] = [number * span_s, (number + 1) * span_s];
     const [from_us, to_us] = [Math.max(0, Math.round(from_s * 1e6)), Math.round(to_s * 1e6)];
+    const { derived } = this;
+    const lead_us = Math.round(lead_s(derived) * 1e6);
     this.under_way += 1;
     try {
       const known_to_s = Math.min(to_s, now_s - kSettled_s);
       const tile =
         level === 0
-          ? tile_of_samples(await this.ways.samples(from_us, to_us))
+          ? with_derived(await this.ways.samples(Math.max(0, from_us - lead_us), to_us), derived, from_s)
           : tile_of_overview(await this.ways.overview(from_us, to_us, kTilePoints));
-      this.tiles.delete(`${level}/${number}`);
-      this.tiles.set(`${level}/${number}`, { ...tile, from_s, to_s, known_to_s });
+      // Meanwhile another set of computed traces may be wanted: then it is asked for again.
+      if (level > 0 || derived === this.derived) this.keep(`${level}/${number}`, { ...tile, from_s, to_s, known_to_s });
       this.problem = null;
-      for (const key of this.tiles.keys()) {
-        if (this.tiles.size <= kMaxTiles) break;
-        this.tiles.delete(key);
-        this.asked_at_s.delete(key);
-      }
     } catch (error) {
       this.problem = error instanceof Error ? error.message : String(error);
     } finally {
       this.under_way -= 1;
     }
     if (!this.is_closed) this.on_change();
+  }
+
+  private keep(key: string, tile: Tile): void {
+    this.tiles.delete(key);
+    this.tiles.set(key, tile);
+    for (const oldest of this.tiles.keys()) {
+      if (this.tiles.size <= kMaxTiles) break;
+      this.tiles.delete(oldest);
+      this.asked_at_s.delete(oldest);
+    }
   }
 }
 
@@ -181,6 +202,35 @@ export function tile_of_samples(samples: StoredSample[]): Points {
   keep('estimate_low_m', (sample) => estimate_m(sample) - spread_m(sample));
   keep('estimate_high_m', (sample) => estimate_m(sample) + spread_m(sample));
   return { first_s: time_s, last_s: time_s, columns };
+}
+
+// Computed columns are right from the first sample of a tile on, since what lies before it was asked for as well.
+function with_derived(samples: StoredSample[], specs: readonly DerivedSpec[], from_s: number): Points {
+  const all = tile_of_samples(samples);
+  if (specs.length === 0) return all;
+  const size = all.first_s.length;
+  const period_s = size > 1 ? median_step_s(all.first_s) : 0.01;
+  const recorded = (Object.keys(all.columns) as Column[]).map(
+    (name) => [name, (all.columns[name] as Extremes).min] as const,
+  );
+  const rows = new DerivedRows(
+    new ListRows(all.first_s, Object.fromEntries(recorded), period_s, kGapPeriods * period_s),
+    specs,
+  );
+  rows.update();
+  const first = all.first_s.findIndex((time_s) => time_s >= from_s);
+  const cut = (values: Float64Array) => values.subarray(first < 0 ? size : first, size);
+  const columns: Points['columns'] = {};
+  for (const name of [...recorded.map(([each]) => each), ...specs.map(column_of)]) {
+    const values = cut(rows.column(name));
+    columns[name] = { min: values, max: values };
+  }
+  return { first_s: cut(all.first_s), last_s: cut(all.last_s), columns };
+}
+
+function median_step_s(time_s: Float64Array): number {
+  const steps = time_s.subarray(1).map((at_s, i) => at_s - (time_s[i] as number));
+  return steps.sort()[steps.length >> 1] as number;
 }
 
 // An overview has no setpoint, no disturbance and no "±": the position is what the controller saw, and no estimate is made

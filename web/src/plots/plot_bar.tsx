@@ -2,9 +2,15 @@
 
 import { useSignal, type Signal } from '@preact/signals';
 import { useCloseOnEscape } from '../keys';
-import { kStrips, type PlotSettings } from './strips';
+import { DerivedChoice } from './derived_choice';
+import { kPredicted, kStrips, type PlotSettings, type Strip } from './strips';
 
-const kSpans = [
+export interface Span {
+  span_s: number;
+  text: string;
+}
+
+const kSpans: readonly Span[] = [
   { span_s: 60, text: '1 min' },
   { span_s: 600, text: '10 min' },
   { span_s: 3600, text: '1 h' },
@@ -22,21 +28,30 @@ interface BarProps {
   state: Signal<PlotState>;
   note: Signal<string>;
   settings: PlotSettings;
-  on_live(): void;
+  on_live?: () => void; // none where nothing is live
   on_span(span_s: number): void;
+  spans?: readonly Span[];
   children?: preact.ComponentChildren;
 }
 
-export function PlotBar({ state, note, settings, on_live, on_span, children }: BarProps) {
+export function PlotBar({ state, note, settings, on_live, on_span, spans = kSpans, children }: BarProps) {
   const { is_live, span_s, range } = state.value;
-  const { is_utc } = settings.kept.value;
+  const { is_utc, xy } = settings.kept.value;
   return (
     <div class="plot-bar">
-      <button type="button" id="plots-live" class={is_live ? 'live' : 'held'} aria-pressed={is_live} onClick={on_live}>
-        {is_live ? 'Live' : 'Back to live'}
-      </button>
+      {on_live && (
+        <button
+          type="button"
+          id="plots-live"
+          class={is_live ? 'live' : 'held'}
+          aria-pressed={is_live}
+          onClick={on_live}
+        >
+          {is_live ? 'Live' : 'Back to live'}
+        </button>
+      )}
       <div class="spans" role="group" aria-label="How much time the plots show">
-        {kSpans.map((span) => (
+        {spans.map((span) => (
           <button
             type="button"
             key={span.span_s}
@@ -53,16 +68,31 @@ export function PlotBar({ state, note, settings, on_live, on_span, children }: B
       <output class="plot-note" id="plots-note">
         {note}
       </output>
-      <button
-        type="button"
-        id="plots-clock"
-        title="The clock of the time axis"
-        onClick={() => settings.change({ is_utc: !is_utc })}
-      >
-        {is_utc ? 'UTC' : 'Local time'}
-      </button>
-      {children}
-      <TraceList settings={settings} />
+      <div class="plot-choices">
+        <button
+          type="button"
+          id="plots-clock"
+          title="The clock of the time axis"
+          onClick={() => settings.change({ is_utc: !is_utc })}
+        >
+          {is_utc ? 'UTC' : 'Local time'}
+        </button>
+        <button
+          type="button"
+          id="plots-xy"
+          aria-pressed={xy.is_open}
+          title="Any channel against any other, below the strips"
+          onClick={() => {
+            settings.change({ xy: { ...xy, is_open: !xy.is_open } });
+            // Below the strips it may be out of sight.
+            setTimeout(() => document.getElementById('xy-plot')?.scrollIntoView({ block: 'nearest' }));
+          }}
+        >
+          X–Y
+        </button>
+        {children}
+        <TraceList settings={settings} />
+      </div>
     </div>
   );
 }
@@ -86,7 +116,7 @@ function TraceList({ settings }: { settings: PlotSettings }) {
         <fieldset id="trace-list">
           <legend>Traces, kept in this browser</legend>
           {kStrips.flatMap((strip) =>
-            [...strip.traces].reverse().map(({ name, text, swatch }) => (
+            choices_of(strip).map(({ name, text, swatch }) => (
               <label key={name}>
                 <input
                   type="checkbox"
@@ -100,8 +130,16 @@ function TraceList({ settings }: { settings: PlotSettings }) {
               </label>
             )),
           )}
+          <DerivedChoice settings={settings} />
         </fieldset>
       )}
     </div>
   );
+}
+
+// From the top of the drawing downwards; what was predicted stands below what was estimated.
+function choices_of(strip: Strip): { name: string; text: string; swatch: string }[] {
+  const [first, ...others] = [...strip.traces].reverse();
+  if (!first) return [];
+  return strip.has_predicted ? [first, kPredicted, ...others] : [first, ...others];
 }

@@ -3,8 +3,9 @@
 import { signal, type Signal } from '@preact/signals';
 import type { StripOptions, Trace } from '../chart';
 import { milliseconds_of_us, millimetres, millimetres_per_s, millivolts, percent } from '../format';
-import type { Column } from '../samples';
+import type { AnyColumn, Column } from '../samples';
 import type { Shelf } from '../settings';
+import { column_of, name_of, parse_spec, type DerivedSpec } from './derived';
 
 export interface TraceChoice extends Trace {
   name: string; // as it is kept
@@ -18,9 +19,12 @@ export interface Strip extends Omit<StripOptions, 'traces' | 'band'> {
   unit: string;
   value: (value: number | null) => string;
   traces: TraceChoice[]; // the last one is drawn on top
+  has_predicted?: boolean; // what was predicted of an experiment is drawn in it
 }
 
-const trace = (name: string, text: string, column: Column, colour: string, more: Partial<TraceChoice> = {}) => ({
+export const kPredicted = { name: 'predicted', text: 'predicted ± 2 sd', swatch: 'predicted' };
+
+const trace = (name: string, text: string, column: AnyColumn, colour: string, more: Partial<TraceChoice> = {}) => ({
   name,
   text,
   column,
@@ -39,6 +43,7 @@ export const kStrips: readonly Strip[] = [
     label: (value) => millimetres(value, 0),
     least_span: 0.08,
     is_large: true,
+    has_predicted: true,
     traces: [
       trace('reference', 'reference', 'reference_m', '--commanded-soft', { width_px: 1.2 }),
       trace('setpoint', 'setpoint', 'setpoint_m', '--commanded', {
@@ -116,14 +121,26 @@ export const kStrips: readonly Strip[] = [
   },
 ];
 
-const kUsual = ['position', 'seen', 'setpoint', 'reference', 'duty', 'impedance'];
+const kUsual = ['position', 'predicted', 'seen', 'setpoint', 'reference', 'duty', 'impedance'];
 const kKey = 'rheonaut.plots';
-const kNames = kStrips.flatMap((strip) => strip.traces.map(({ name }) => name));
+const kNames = [...kStrips.flatMap((strip) => strip.traces.map(({ name }) => name)), kPredicted.name];
+export const kRecorded: readonly Column[] = kStrips.flatMap(({ traces }) =>
+  traces.map(({ column }) => column as Column),
+);
+const kMostDerived = 8;
+
+export interface XyChoice {
+  is_open: boolean;
+  x: AnyColumn;
+  y: AnyColumn;
+}
 
 export interface Kept {
   traces: string[];
   is_utc: boolean;
   span_s: number;
+  derived: DerivedSpec[];
+  xy: XyChoice;
 }
 
 // What the browser keeps of how the plots look. SAFETY: nothing that commands or stops reads it.
@@ -143,11 +160,36 @@ export class PlotSettings {
     }
   }
 
-  // At least one stays: an empty view would look like a fault.
+  // At least one that is always there stays: an empty view would look like a fault.
   toggle(name: string): void {
     const { traces } = this.kept.peek();
     const next = traces.includes(name) ? traces.filter((other) => other !== name) : [...traces, name];
-    if (next.length > 0) this.change({ traces: next });
+    if (next.some((each) => each !== kPredicted.name)) this.change({ traces: next });
+  }
+
+  // Why a derived trace is not added; '': it is, and is shown.
+  add_derived(spec: DerivedSpec): string {
+    const { derived, traces } = this.kept.peek();
+    const column = column_of(spec);
+    if (derived.some((other) => column_of(other) === column)) return `“${name_of(spec)}” is there already.`;
+    if (derived.length >= kMostDerived) return `There are ${kMostDerived} already: remove one first.`;
+    if (spec.kind === 'difference' && spec.of === spec.less)
+      return 'A trace less itself is 0: choose two different ones.';
+    if (spec.kind === 'difference' && look_of(spec.of).unit !== look_of(spec.less).unit)
+      return `${spec.of} is in ${look_of(spec.of).unit}, ${spec.less} in ${look_of(spec.less).unit}: choose two in one unit.`;
+    this.change({ derived: [...derived, spec], traces: [...traces, column] });
+    return '';
+  }
+
+  remove_derived(spec: DerivedSpec): void {
+    const { derived, traces, xy } = this.kept.peek();
+    const column = column_of(spec);
+    const left = traces.filter((name) => name !== column);
+    this.change({
+      derived: derived.filter((other) => column_of(other) !== column),
+      traces: left.some((name) => name !== kPredicted.name) ? left : kUsual,
+      xy: { ...xy, x: xy.x === column ? kUsualXy.x : xy.x, y: xy.y === column ? kUsualXy.y : xy.y },
+    });
   }
 
   private load(): Kept {
@@ -157,24 +199,87 @@ export class PlotSettings {
     } catch {
       // What cannot be read is as if it were not there.
     }
-    const traces = Array.isArray(said?.traces) ? said.traces.filter((name) => kNames.includes(name)) : [];
+    const list = Array.isArray(said?.derived) ? (said.derived as unknown[]) : [];
+    const derived = list.map((kept) => parse_spec(kept, kRecorded)).filter((spec) => spec !== null);
+    const columns = derived.map(column_of);
+    const names: string[] = [...kNames, ...columns];
+    const traces = Array.isArray(said?.traces) ? said.traces.filter((name) => names.includes(name)) : [];
     const span_s = typeof said?.span_s === 'number' && said.span_s >= 1 && said.span_s <= 86_400 ? said.span_s : 60;
-    return { traces: traces.length > 0 ? traces : kUsual, is_utc: said?.is_utc === true, span_s };
+    const is_column = (name: unknown) => [...kRecorded, ...columns].includes(name as Column);
+    const { x, y, is_open } = said?.xy ?? {};
+    return {
+      traces: traces.some((name) => name !== kPredicted.name) ? traces : kUsual,
+      is_utc: said?.is_utc === true,
+      span_s,
+      derived,
+      xy: {
+        is_open: is_open === true,
+        x: is_column(x) ? (x as AnyColumn) : kUsualXy.x,
+        y: is_column(y) ? (y as AnyColumn) : kUsualXy.y,
+      },
+    };
   }
 }
 
+const kUsualXy = { x: 'estimate_m', y: 'impedance_mv' } as const;
+
+// How the values of a recorded column are written.
+export function look_of(column: AnyColumn): Pick<Strip, 'unit' | 'value' | 'label' | 'least_span'> {
+  const strip = kStrips.find(({ traces }) => traces.some((each) => each.column === column));
+  return strip ?? (kStrips[0] as Strip);
+}
+
+const kPerSecond: Record<string, string> = { 'mm/s': 'mm/s²', 'mm/s²': 'mm/s³' };
+
+// Of a derived one: in its own unit.
+export function look_of_derived(spec: DerivedSpec): Pick<Strip, 'unit' | 'value' | 'label' | 'least_span'> {
+  const { unit, value, label, least_span = 1 } = look_of(spec.of);
+  if (spec.kind !== 'derivative') return { unit, value, label, least_span: least_span / 4 };
+  return {
+    unit: kPerSecond[unit] ?? `${unit}/s`,
+    value,
+    label: (each: number) => value(each),
+    least_span: least_span / 4,
+  };
+}
+
+const derived_strip = (spec: DerivedSpec): Strip => {
+  const [name, column] = [name_of(spec), column_of(spec)];
+  return {
+    name: column,
+    title: name,
+    ...look_of_derived(spec),
+    traces: [trace(column, name, column, '--derived', { swatch: 'derived' })],
+  };
+};
+
 // The strips that have at least one chosen trace, with those alone; the band goes with the estimate.
-export function chosen_strips(chosen: readonly string[]): Strip[] {
-  return kStrips
-    .map((strip) => ({ ...strip, traces: strip.traces.filter(({ name }) => chosen.includes(name)) }))
+export function chosen_strips(chosen: readonly string[], derived: readonly DerivedSpec[] = []): Strip[] {
+  return [...kStrips, ...derived.map(derived_strip)]
+    .map((strip) => ({
+      ...strip,
+      traces: strip.traces.filter(({ name }) => chosen.includes(name)),
+      has_predicted: strip.has_predicted === true && chosen.includes(kPredicted.name),
+    }))
     .filter(({ traces }) => traces.length > 0);
 }
 
 export const has_band = (strip: Strip) => strip.traces.some(({ column }) => column === 'estimate_m');
 
 // All that is drawn, each once.
-export function columns_of(strips: readonly Strip[]): Column[] {
+export function columns_of(strips: readonly Strip[]): AnyColumn[] {
   const columns = strips.flatMap((strip) => strip.traces.map(({ column }) => column));
   const band: Column[] = strips.some(has_band) ? ['estimate_low_m', 'estimate_high_m'] : [];
   return [...new Set([...band, ...columns])];
+}
+
+// All that can be put against each other, with their names for people.
+export const channels_of = (derived: readonly DerivedSpec[]): { column: AnyColumn; text: string }[] => [
+  ...kRecorded.map((column) => ({ column, text: column })),
+  ...derived.map((spec) => ({ column: column_of(spec), text: name_of(spec) })),
+];
+
+export function look_of_any(column: AnyColumn, derived: readonly DerivedSpec[]) {
+  const spec = derived.find((each) => column_of(each) === column);
+  return spec ? look_of_derived(spec) : look_of(column);
 }

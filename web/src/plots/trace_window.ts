@@ -5,7 +5,7 @@
 // column in their order, so that no peak is left out. Bins lie at fixed times: a plot that runs does not shimmer. A
 // column has one gap for each stretch in which it has no value.
 
-import type { Column, SampleRing } from '../samples';
+import type { AnyColumn, SampleRows } from '../samples';
 import { Blocks, kBlock } from './blocks';
 import type { Past, Tile } from './past';
 import type { Stretch } from './time_axis';
@@ -14,7 +14,7 @@ const kRawSamplesPerBin = 2; // fewer are drawn as they are
 const kLeastHole_s = 0.5; // a shorter hole between received samples is not looked up
 
 export interface Source {
-  ring: SampleRing;
+  ring: SampleRows;
   shift_s: number; // UTC = time of the ring + this
   past: Pick<Past, 'visit'> | null;
 }
@@ -44,7 +44,7 @@ export class TraceWindow {
 
   constructor(
     private readonly capacity: number,
-    readonly names: readonly Column[],
+    readonly names: readonly AnyColumn[],
   ) {
     this.blocks = new Blocks(names);
     this.time_s = new Float64Array(capacity);
@@ -67,7 +67,7 @@ export class TraceWindow {
     this.gap_s = ring.gap_s;
     const span_s = to_s - from_s;
     this.bin_s = span_s / bins > kRawSamplesPerBin * ring.period_s ? span_s / bins : 0;
-    const columns = this.names.map((name) => ring.columns[name]);
+    const columns = this.names.map((name) => ring.column(name));
     const look_up = (start_s: number, end_s: number) => {
       if (past && end_s - start_s > kLeastHole_s) {
         past.visit(start_s, end_s, span_s / bins, (tile, at) => this.put_point(tile, at, start_s, end_s));
@@ -120,7 +120,7 @@ export class TraceWindow {
   }
 
   // The value of a column in a row; null where it has none.
-  value_at(column: Column, row: number): number | null {
+  value_at(column: AnyColumn, row: number): number | null {
     const at = this.names.indexOf(column);
     if (at < 0) return null;
     const value = this.values[at]?.[row] ?? NaN;

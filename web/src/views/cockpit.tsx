@@ -25,7 +25,7 @@ export function Cockpit({ session }: { session: Session }) {
   const view = view_named(name);
   const module = view ? loader.of(view).value.module : null;
   const View = module?.default;
-  const Hands = module?.Hands;
+  const Hands = module?.has_hands?.(route.value) === false ? undefined : module?.Hands;
   return (
     <div class={`cockpit ${name === 'robot' ? 'of-robot' : 'of-view'}`}>
       <TopBar session={session} />

@@ -16,6 +16,7 @@ export interface ViewProps {
 export interface ViewModule {
   default: ComponentType<ViewProps>;
   Hands?: ComponentType<ViewProps>;
+  has_hands?(route: Route): boolean; // where not every address of the view has something there
 }
 
 export interface View {

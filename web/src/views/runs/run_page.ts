@@ -28,6 +28,11 @@ export class RunPage {
     const steps = this.metrics.value?.steps ?? [];
     return moments_of(run, this.markers.value, this.events.value, steps, this.span_starts_us, this.knots);
   });
+  // Of the whole run: where samples are missing, since its first one.
+  readonly gaps_s = computed(() => {
+    const whole = this.whole.value;
+    return whole ? traces_of(whole, this.origin_us, new Knots(period_us_of(whole))).gaps_s : [];
+  });
   span_starts_us: number[] = [];
   private knots = new Knots(10_000);
   private window: Window | null = null;
@@ -80,6 +85,8 @@ export class RunPage {
     if (!this.whole.peek()) return; // load() looks when it is there
     await this.load_window();
   }
+
+  losses = () => this.api.losses(this.run_id);
 
   stop(): void {
     this.turn += 1;

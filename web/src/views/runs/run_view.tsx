@@ -1,6 +1,5 @@
 // One run: its plots, what happened in it, its figures and steps, its impedance map; its record stands below the stop.
 
-import { useEffect } from 'preact/hooks';
 import { date_and_time, fluid_text } from '../../format';
 import { format, go_to, type Route } from '../../route';
 import type { Session } from '../../session';
@@ -10,9 +9,10 @@ import { length_text, Record } from './record';
 import { RunPage } from './run_page';
 import type { Run, RunsApi } from './runs_api';
 import { Figures, Moments, Steps } from './tables';
+import { useRunPage } from './use_run_page';
 import { around, window_query } from './windows';
+import { ReplayView } from './replay/replay_view';
 
-const kRefresh_ms = 5000; // of a run that is open
 const kAround_us = 5_000_000; // shown to either side of a moment
 
 interface Props {
@@ -37,26 +37,22 @@ const number_of = (route: Route): number | null => {
 
 export function RunHands({ session, api, route }: Props) {
   const run_id = number_of(route);
-  return run_id === null ? null : <Record session={session} api={api} page={page_of(api, run_id)} />;
+  return run_id === null || route.parts[1] === 'replay' ? null : (
+    <Record session={session} api={api} page={page_of(api, run_id)} />
+  );
 }
 
 export function RunView({ session, api, route }: Props) {
   const run_id = number_of(route);
   if (run_id === null) return <NoSuchRun text={`“${route.parts[0] ?? ''}” is no number of a run.`} />;
+  if (route.parts[1] === 'replay')
+    return <ReplayView key={`replay-${run_id}`} session={session} page={page_of(api, run_id)} route={route} />;
   return <OneRun session={session} page={page_of(api, run_id)} api={api} route={route} />;
 }
 
 function OneRun({ session, page, api, route }: Props & { page: RunPage }) {
-  const is_live = session.phase.value === 'live';
   const run = page.run.value;
-  const is_open = run?.state === 'open';
-  useEffect(() => {
-    if (!is_live) return;
-    void page.load();
-    if (!is_open) return;
-    const timer = setInterval(() => void page.load(), kRefresh_ms);
-    return () => clearInterval(timer);
-  }, [page, is_live, is_open]);
+  useRunPage(session, page);
 
   if (page.problem.value && !run) return <NoSuchRun text={page.problem.value} />;
   if (!run) {
@@ -81,6 +77,15 @@ function OneRun({ session, page, api, route }: Props & { page: RunPage }) {
           {run.fluid && ` · ${fluid_text(run.fluid)}`}
           {run.verdict && ` · ${run.verdict}`}
         </p>
+        {run.state !== 'discarded' && (
+          <a
+            class="button replay-link"
+            id="open-replay"
+            href={format({ view: 'runs', parts: [`${run.run_id}`, 'replay'] })}
+          >
+            Replay
+          </a>
+        )}
       </section>
       <main class="view-body run-view" aria-label={`Run ${run.run_id}`}>
         {run.state === 'discarded' ? (

@@ -18,6 +18,10 @@ export type AlignedRuns = Schemas['AlignedRuns'];
 export type AlignedRun = Schemas['AlignedRun'];
 export type ImpedanceMap = Schemas['ImpedanceMap'];
 export type ImpedanceBins = Schemas['ImpedanceBins'];
+export type GapList = Schemas['GapList'];
+export interface Losses extends Pick<GapList, 'gaps' | 'missing'> {
+  is_whole: boolean; // there are no more
+}
 export type Annotation = Schemas['RunAnnotationBody'];
 
 export interface AskedRuns {
@@ -33,6 +37,7 @@ export interface Window {
 }
 
 export const kMostComparedTraces = 12;
+const kMostGapPages = 10;
 
 // A query of what is not empty.
 export function query(members: Record<string, string | number | null | undefined>): string {
@@ -49,6 +54,18 @@ export class RunsApi {
   certificate = (run_id: number) => this.api.read<Certificate>(`/runs/${run_id}/certificate`);
   metrics = (run_id: number) => this.api.read<RunMetrics>(`/runs/${run_id}/metrics`);
   markers = async (run_id: number) => (await this.api.read<{ markers: Marker[] }>(`/runs/${run_id}/markers`)).markers;
+  // What is not there of a run; of a run with very many gaps the first ones.
+  losses = async (run_id: number): Promise<Losses> => {
+    const found: Losses = { gaps: [], missing: [], is_whole: false };
+    for (let after: string | null = null, pages = 0; pages < kMostGapPages; ++pages) {
+      const page: GapList = await this.api.read<GapList>(`/runs/${run_id}/gaps?${query({ after, limit: 1000 })}`);
+      found.gaps.push(...page.gaps);
+      found.missing.push(...page.missing);
+      if (page.next === null) return { ...found, is_whole: true };
+      after = page.next;
+    }
+    return found;
+  };
   // The newest of the robot; those of an old run may be out of reach.
   events = async (robot_id: string) =>
     (await this.api.read<{ events: EventRecord[] }>(`/robots/${encodeURIComponent(robot_id)}/events?limit=1000`))

@@ -1,5 +1,7 @@
 // The view of runs: the list, one run, or several beside each other.
 
+import { shows_past } from '../../past_guard';
+import type { Route } from '../../route';
 import type { Session } from '../../session';
 import type { ViewProps } from '../table';
 import { CompareHands, CompareView } from './compare_view';
@@ -17,6 +19,9 @@ export default function RunsView({ session, route }: ViewProps) {
   if (what === 'compare') return <CompareView session={session} api={asks} route={route} />;
   return <RunView key={what} session={session} api={asks} route={route} />;
 }
+
+// SAFETY: beside a replay stands the stop and nothing else.
+export const has_hands = (route: Route): boolean => !shows_past(route);
 
 export function Hands({ session, route }: ViewProps) {
   const [what] = route.parts;
