@@ -6,6 +6,7 @@ import type { components } from './api_types';
 import { millimetres, percent } from './format';
 import { kReasons } from './reasons';
 import { outcome_of, type StopOutcome } from './stop_outcome';
+import { kSampleFields } from './telemetry_fields';
 
 type Schemas = components['schemas'];
 export type Fluid = Schemas['Fluid'];
@@ -65,6 +66,13 @@ export class ApiError extends Error {
 
 export type Fetch = (path: string, options: RequestInit) => Promise<Response>;
 
+const kOverviewChannels = [
+  ...kSampleFields,
+  'setpoint_m',
+  'disturbance_m',
+  'position_sd_m',
+  'estimated_position_m',
+].join(',');
 const kPatience_ms = 6000;
 const kLongPatience_ms = 30_000; // for what is computed from many samples
 
@@ -137,7 +145,7 @@ export class Api {
   robot_samples = async (robot_id: string, from_us: number, to_us: number, limit: number) =>
     (await this.ask<{ samples: StoredSample[] }>('GET', past(robot_id, 'samples', { from_us, to_us, limit }))).samples;
   robot_overview = (robot_id: string, from_us: number, to_us: number, points: number) =>
-    this.ask<Overview>('GET', past(robot_id, 'overview', { from_us, to_us, points }));
+    this.ask<Overview>('GET', past(robot_id, 'overview', { from_us, to_us, points, channels: kOverviewChannels }));
   robot_events = async (robot_id: string) =>
     (await this.ask<{ events: EventRecord[] }>('GET', past(robot_id, 'events', { limit: 1000 }))).events;
   robot_commands = async (robot_id: string) =>
@@ -218,9 +226,9 @@ export class Api {
   }
 }
 
-const past = (robot_id: string, what: string, query: Record<string, number>) =>
+const past = (robot_id: string, what: string, query: Record<string, number | string>) =>
   `/robots/${encodeURIComponent(robot_id)}/${what}${query_of(query)}`;
-const query_of = (query: Record<string, number>) => {
+const query_of = (query: Record<string, number | string>) => {
   const members = Object.entries(query).map(([name, value]) => `${name}=${value}`);
   return members.length === 0 ? '' : `?${members.join('&')}`;
 };

@@ -233,16 +233,28 @@ function median_step_s(time_s: Float64Array): number {
   return steps.sort()[steps.length >> 1] as number;
 }
 
-// An overview has no setpoint, no disturbance and no "±": the position is what the controller saw, and no estimate is made
-// of it. A reference of 0 throughout is what a robot records while it follows none.
+// The "±" of a point is the largest of its samples. A reference of 0 throughout is what a robot records while it follows
+// none.
 export function tile_of_overview(overview: Overview): Points {
   const columns: Points['columns'] = {};
-  for (const name of kSampleFields) {
-    const channel = overview[name];
-    if (!channel) continue;
+  const keep = (column: Column, channel: Overview['position_m']) => {
+    if (!channel) return;
     const [min, max] = [Float64Array.from(channel.min, number_of), Float64Array.from(channel.max, number_of)];
-    if (name === 'reference_m') min.forEach((value, at) => value === 0 && max[at] === 0 && (min[at] = max[at] = NaN));
-    columns[name] = { min, max };
+    columns[column] = { min, max };
+  };
+  for (const name of kSampleFields) keep(name, overview[name]);
+  for (const name of ['setpoint_m', 'disturbance_m', 'position_sd_m'] as const) keep(name, overview[name]);
+  keep('estimate_m', overview.estimated_position_m);
+  const { reference_m, estimate_m, position_sd_m } = columns;
+  reference_m?.min.forEach((value, at) => {
+    if (value === 0 && reference_m.max[at] === 0) reference_m.min[at] = reference_m.max[at] = NaN;
+  });
+  if (estimate_m && position_sd_m) {
+    const spread_m = position_sd_m.max.map((sd_m) => kSpread_sd * sd_m);
+    const low_m = estimate_m.min.map((value_m, at) => value_m - (spread_m[at] as number));
+    const high_m = estimate_m.max.map((value_m, at) => value_m + (spread_m[at] as number));
+    columns.estimate_low_m = { min: low_m, max: low_m };
+    columns.estimate_high_m = { min: high_m, max: high_m };
   }
   return {
     first_s: Float64Array.from(overview.first_utc_us, (time_us) => time_us / 1e6),

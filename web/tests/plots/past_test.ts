@@ -116,7 +116,7 @@ test('a failure is told, tried again later, and forgotten when it works', async 
   expect(past.problem).toBeNull();
 });
 
-test('of samples the estimate and its spread are made; of an overview they are not', () => {
+test('of samples the estimate and its spread are made; an overview has them', () => {
   const sample = {
     utc_us: 5_000_000,
     position_m: 0.1,
@@ -135,9 +135,17 @@ test('of samples the estimate and its spread are made; of an overview they are n
       last_utc_us: [0.5e6, 1.5e6],
       position_m: { min: [0.1, null], max: [0.12, null] },
       reference_m: { min: [0, 0.1], max: [0, 0.1] },
+      estimated_position_m: { min: [0.15, null], max: [0.17, null] },
+      position_sd_m: { min: [0.001, 0.001], max: [0.003, 0.003] },
+      setpoint_m: { min: [0.1, null], max: [0.12, null] },
     }),
   ).columns;
-  expect(far.estimate_m).toBeUndefined();
+  const first = (values?: Float64Array) => Number(values![0]!.toFixed(9));
+  expect([first(far.estimate_m?.min), first(far.estimate_m?.max)]).toEqual([0.15, 0.17]);
+  expect([first(far.estimate_low_m?.min), first(far.estimate_high_m?.max)]).toEqual([0.144, 0.176]);
+  expect(far.estimate_low_m?.min[1]).toBeNaN();
+  expect([...far.setpoint_m!.max]).toEqual([0.12, NaN]);
+  expect(far.disturbance_m).toBeUndefined();
   expect([...far.position_m!.max]).toEqual([0.12, NaN]);
   expect([...far.reference_m!.max]).toEqual([NaN, 0.1]);
 });
