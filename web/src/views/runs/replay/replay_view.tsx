@@ -13,7 +13,7 @@ import { Readouts } from '../../../parts/readouts';
 import { PlotBar } from '../../../plots/plot_bar';
 import { StripHost } from '../../../plots/strip_host';
 import { XyPlot } from '../../../plots/xy_plot';
-import { change_query, format, type Route } from '../../../route';
+import { change_query, format, route, type Route } from '../../../route';
 import type { Session } from '../../../session';
 import type { RunPage } from '../run_page';
 import type { Run } from '../runs_api';
@@ -205,6 +205,8 @@ function useAddress(replay: Replay, { query }: Route): string {
     shown.current = key_of(now().at, now().speed);
   }, [replay, query['at'], query['speed']]);
   const write = () => {
+    const { at, speed } = route.peek().query;
+    if (key_of(at, speed) !== followed.current) return; // another address has come, and is followed first
     const next = now();
     const key = key_of(next.at, next.speed);
     if (key === shown.current) return;

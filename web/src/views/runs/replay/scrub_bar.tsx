@@ -16,6 +16,23 @@ export function ScrubBar({ replay, whole, gaps_s }: { replay: Replay; whole: Ove
   const share = (time_s: number) => `${(Math.min(1, Math.max(0, time_s / length_s)) * 100).toFixed(3)}%`;
   const marks = useMemo(() => thinned(replay.marks.value, length_s), [replay.marks.value, length_s]);
   const outline = useMemo(() => outline_of(whole, length_s, replay.reel.gap_s), [whole, length_s]);
+  // The same for as long as the run is: it is not made anew while the moment moves.
+  const still = useMemo(
+    () => (
+      <>
+        <svg viewBox={`0 0 ${kWidth} ${kHeight}`} preserveAspectRatio="none" aria-hidden="true">
+          <path d={outline} />
+        </svg>
+        {gaps_s.map(([from_s, to_s]) => (
+          <span key={from_s} class="scrub-gap" style={{ left: share(from_s), width: share(to_s - from_s) }} />
+        ))}
+        {marks.map(({ at_s: time_s, tone, text }) => (
+          <i key={`${tone} ${time_s}`} class={tone} style={{ left: share(time_s) }} title={text} />
+        ))}
+      </>
+    ),
+    [marks, outline, gaps_s, length_s],
+  );
   const seek = (event: PointerEvent) => {
     const { left, width } = (bar.current as HTMLDivElement).getBoundingClientRect();
     replay.seek(((event.clientX - left) / width) * length_s);
@@ -40,15 +57,7 @@ export function ScrubBar({ replay, whole, gaps_s }: { replay: Replay; whole: Ove
       }}
       onPointerMove={(event) => event.currentTarget.hasPointerCapture(event.pointerId) && seek(event)}
     >
-      <svg viewBox={`0 0 ${kWidth} ${kHeight}`} preserveAspectRatio="none" aria-hidden="true">
-        <path d={outline} />
-      </svg>
-      {gaps_s.map(([from_s, to_s]) => (
-        <span key={from_s} class="scrub-gap" style={{ left: share(from_s), width: share(to_s - from_s) }} />
-      ))}
-      {marks.map(({ at_s: time_s, tone, text }) => (
-        <i key={`${tone} ${time_s}`} class={tone} style={{ left: share(time_s) }} title={text} />
-      ))}
+      {still}
       <u style={{ width: share(at_s) }} />
       <b style={{ left: share(at_s) }} />
     </div>
