@@ -3,7 +3,8 @@
 import '../src/styles';
 import { render } from 'preact';
 import type { RobotState, SamplesMessage } from '../src/api';
-import { Plots, plot_settings } from '../src/parts/plots';
+import { Plots } from '../src/parts/plots';
+import { plot_settings } from '../src/plots/strips';
 import { Session } from '../src/session';
 
 const kHz = 100;

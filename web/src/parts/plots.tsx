@@ -11,13 +11,12 @@ import { Marks } from '../plots/marks';
 import { Past } from '../plots/past';
 import { PlotBar, type PlotState } from '../plots/plot_bar';
 import { PlotHand } from '../plots/plot_hand';
-import { chosen_strips, columns_of, has_band, PlotSettings, type Strip } from '../plots/strips';
+import { chosen_strips, columns_of, has_band, plot_settings, type Strip } from '../plots/strips';
 import { clock_label, day_label, stretch_of, TimeAxis } from '../plots/time_axis';
 import type { TraceWindow } from '../plots/trace_window';
 import type { Robot } from '../robot';
 import { change_query, route } from '../route';
 import type { Session } from '../session';
-import { browser_shelf } from '../settings';
 import { ThresholdList } from './threshold_list';
 
 const kRingSamples = 65_536; // ten minutes at 100 Hz
@@ -26,8 +25,6 @@ const kCursor_ms = 100; // between two texts of the cursor while the plots run
 const kAddress_ms = 250; // after the last change of the stretch
 const kMarksAgain_ms = 20_000;
 const kReach_px = 6; // of a mark
-
-export const plot_settings = new PlotSettings(browser_shelf());
 
 const zone_at = (utc_s: number, is_utc: boolean) => (is_utc ? 0 : -60 * new Date(utc_s * 1000).getTimezoneOffset());
 

@@ -4,7 +4,7 @@ import { signal, type Signal } from '@preact/signals';
 import type { StripOptions, Trace } from '../chart';
 import { milliseconds_of_us, millimetres, millimetres_per_s, millivolts, percent } from '../format';
 import type { Column } from '../samples';
-import type { Shelf } from '../settings';
+import { browser_shelf, type Shelf } from '../settings';
 
 export interface TraceChoice extends Trace {
   name: string; // as it is kept
@@ -162,6 +162,9 @@ export class PlotSettings {
     return { traces: traces.length > 0 ? traces : kUsual, is_utc: said?.is_utc === true, span_s };
   }
 }
+
+// Of this page; the switch between local time and UTC is the same in other views.
+export const plot_settings = new PlotSettings(browser_shelf());
 
 // The strips that have at least one chosen trace, with those alone; the band goes with the estimate.
 export function chosen_strips(chosen: readonly string[]): Strip[] {
