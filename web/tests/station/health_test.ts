@@ -61,7 +61,7 @@ const kGood: HealthInput = {
   metrics: kMetrics,
   pace: { samples_per_s: 200, commits: 20, over_s: 10 },
   fleet: { connected: 2, known: 3, silent: 0, unstoppable: 0, unmeasured: 0, samples_per_s: 200, worst_ms: 0.4 },
-  page_ms: 1.2,
+  is_page_measured: true,
   clock_off_ms: 3,
   now_ms: kNow_ms,
   is_current: true,
@@ -89,8 +89,11 @@ test('SAFETY: nothing is good while the page is cut off, and no value is dropped
 });
 
 test('SAFETY: what is not measured yet is not called well', () => {
-  expect(word('stop', { page_ms: null })).toBe('unknown');
-  expect(summary_of(judge({ ...kGood, page_ms: null }))).toMatchObject({ word: 'unknown', text: '1 not known yet' });
+  expect(word('stop', { is_page_measured: false })).toBe('unknown');
+  expect(summary_of(judge({ ...kGood, is_page_measured: false }))).toMatchObject({
+    word: 'unknown',
+    text: '1 not known yet',
+  });
   expect(summary_of(judge({ ...kGood, recording: null })).word).toBe('unknown');
 });
 

@@ -63,7 +63,9 @@ export function Log({ context }: { context: Context }) {
     <div id="station-log" class={context.is_current ? '' : 'was'}>
       <Panel id="station-log-where" title="The station’s own log">
         <p>The station writes its log to its standard output. It does not serve it, so this page cannot show it.</p>
-        <p class="station-note">Started by systemd as the service “rheonaut”, on the station’s machine:</p>
+        <p class="station-note">
+          On the station’s machine, where systemd starts it, for example as the service “rheonaut”:
+        </p>
         <Copyable id="station-journal" label="the command that follows the log" text="journalctl -u rheonaut -f" />
         <p class="station-note">Started by hand, it is in that terminal. To keep it in a file as well:</p>
         <Copyable

@@ -5,7 +5,7 @@ import type { Recording, Station } from '../../api';
 import { plot_settings } from '../../plots/strips';
 import type { Session } from '../../session';
 import { useAsked } from '../experiments/acts';
-import type { Fleet } from './health';
+import { judge, type Fleet, type HealthLine } from './health';
 import type { Metrics } from './metrics';
 import { PaceMeter, type Pace } from './pace';
 import type { StationApi } from './station_api';
@@ -61,7 +61,7 @@ export function useFacts(session: Session, api: StationApi): { facts: Facts | nu
 }
 
 // Changes only when one of its figures does, however many robots report.
-export function useFleet(session: Session): Fleet {
+function useFleet(session: Session): Fleet {
   const figures = useComputed(() => {
     const robots = session.store.robots.value;
     const connected = robots.filter((robot) => !robot.is_away.value);
@@ -79,6 +79,23 @@ export function useFleet(session: Session): Fleet {
     return JSON.stringify(fleet);
   });
   return JSON.parse(figures.value) as Fleet;
+}
+
+// Robots report often: what shows no health does not follow it.
+export function useHealth({ session, facts, is_current }: Context): HealthLine[] {
+  const fleet = useFleet(session);
+  const is_measured = useComputed(() => session.vitals.now.value.page_ms !== null).value;
+  return judge({
+    station: facts?.station ?? null,
+    recording: facts?.recording ?? null,
+    metrics: facts?.metrics ?? null,
+    pace: facts?.pace ?? null,
+    fleet,
+    is_page_measured: is_measured,
+    clock_off_ms: facts?.clock_off_ms ?? null,
+    now_ms: Date.now(),
+    is_current,
+  });
 }
 
 export const use_utc = () => plot_settings.kept.value.is_utc;

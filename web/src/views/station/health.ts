@@ -35,7 +35,7 @@ export interface HealthInput {
   metrics: Metrics | null;
   pace: Pace | null;
   fleet: Fleet;
-  page_ms: number | null; // round trip from this page
+  is_page_measured: boolean; // the way from this page to the station
   clock_off_ms: number | null; // the station's clock less this machine's
   now_ms: number; // UTC
   is_current: boolean; // what the station said is what is so now
@@ -79,7 +79,7 @@ function all_lines(input: HealthInput): HealthLine[] {
     of('Recording', 'database', 'Database', station ? database_line(station) : kNotKnown),
     of('Robots and stop', 'robots', 'Robots', robots_line(fleet)),
     of('Robots and stop', 'links', 'Links to the robots', links_line(fleet)),
-    of('Robots and stop', 'stop', 'Way of a stop', stop_line(fleet, input.page_ms)),
+    of('Robots and stop', 'stop', 'Way of a stop', stop_line(fleet, input.is_page_measured)),
     of('Robots and stop', 'stops', 'Stops until now', metrics ? stops_line(metrics) : kNotKnown),
     of('Station', 'faults', 'Faults inside', metrics ? faults_line(metrics) : kNotKnown),
     of('Station', 'connections', 'Connections', metrics ? connections_line(metrics) : kNotKnown),
@@ -202,7 +202,7 @@ function links_line({ connected, worst_ms }: Fleet): Line {
 }
 
 // SAFETY: a way that is not measured is not called good.
-function stop_line({ connected, unstoppable, unmeasured }: Fleet, page_ms: number | null): Line {
+function stop_line({ connected, unstoppable, unmeasured }: Fleet, is_page_measured: boolean): Line {
   if (connected === 0) return line('good', 'no robot is connected', 'A stop would be kept until a robot reconnects.');
   if (unstoppable > 0)
     return line(
@@ -216,7 +216,7 @@ function stop_line({ connected, unstoppable, unmeasured }: Fleet, page_ms: numbe
       `not measured to ${count(unmeasured)} of ${count(connected)}`,
       'Their firmware answers no probes, or has only just connected.',
     );
-  if (page_ms === null) return line('unknown', '', 'The way from this page is not measured yet.');
+  if (!is_page_measured) return line('unknown', '', 'The way from this page is not measured yet.');
   return line(
     'good',
     `open to ${connected === 1 ? 'the one' : `all ${count(connected)}`} connected`,

@@ -2,14 +2,15 @@
 
 import { GuardedButton } from '../../parts/hold_button';
 import { useActs } from '../experiments/acts';
-import type { Context } from './facts';
-import { summary_of, type HealthLine } from './health';
+import { useHealth, type Context } from './facts';
+import { summary_of } from './health';
 import { exact_text, moment_text } from './moments';
 import { Panel, Problem, WordMark } from './parts';
 
 const kGroups = ['Recording', 'Robots and stop', 'Station'] as const;
 
-export function HealthView({ context, lines }: { context: Context; lines: HealthLine[] }) {
+export function HealthView({ context }: { context: Context }) {
+  const lines = useHealth(context);
   const { facts, is_current, is_utc } = context;
   const { off } = summary_of(lines);
   const as_of = facts ? moment_text(facts.asked_at_ms * 1000, is_utc, true).slice(11) : '';

@@ -13,8 +13,8 @@ import { Audit } from './audit';
 import { Backups } from './backups';
 import { Certificate } from './certificate';
 import { Configuration } from './configuration';
-import { use_utc, useFacts, useFleet, type Context } from './facts';
-import { judge, summary_of, type HealthLine } from './health';
+import { use_utc, useFacts, useHealth, type Context } from './facts';
+import { summary_of } from './health';
 import { HealthView } from './health_view';
 import { span_text } from './moments';
 import { ClockSwitch, WordMark } from './parts';
@@ -26,7 +26,6 @@ import { Tokens } from './tokens';
 
 interface SectionProps {
   context: Context;
-  lines: HealthLine[];
 }
 
 interface Section {
@@ -79,7 +78,6 @@ const api_of = (session: Session) =>
 export default function StationView({ session, route }: ViewProps) {
   const api = api_of(session);
   const { facts, problem } = useFacts(session, api);
-  const fleet = useFleet(session);
   const is_utc = use_utc();
   const is_current = session.store.is_current.value && session.phase.value === 'live' && problem === '';
   const context: Context = {
@@ -92,17 +90,6 @@ export default function StationView({ session, route }: ViewProps) {
     is_utc,
     query: route.query,
   };
-  const lines = judge({
-    station: facts?.station ?? null,
-    recording: facts?.recording ?? null,
-    metrics: facts?.metrics ?? null,
-    pace: facts?.pace ?? null,
-    fleet,
-    page_ms: session.vitals.now.value.page_ms,
-    clock_off_ms: facts?.clock_off_ms ?? null,
-    now_ms: Date.now(),
-    is_current,
-  });
   const part = route.parts[0] ?? 'health';
   const section = kSections.find((each) => each.part === part);
   const Body = section?.of;
@@ -111,11 +98,11 @@ export default function StationView({ session, route }: ViewProps) {
       <section class="view-head station-head" aria-label="The station">
         <div class="station-title">
           <h1>Station</h1>
-          <Summary context={context} lines={lines} />
+          <Summary context={context} />
         </div>
         <Sections part={part} />
       </section>
-      <main class="view-body station-view" aria-label={`Station, ${section?.title ?? 'nothing'}`}>
+      <main class="view-body station-view" aria-label={`Station, ${section?.title ?? 'nothing'}`} tabIndex={0}>
         <header class="station-section">
           <h2>{section?.title ?? 'Nothing is at this address'}</h2>
           {section?.has_times && <ClockSwitch is_utc={is_utc} />}
@@ -125,15 +112,15 @@ export default function StationView({ session, route }: ViewProps) {
             {problem} This is what was known last.
           </p>
         )}
-        {Body ? <Body key={part} context={context} lines={lines} /> : <NoSection part={part} />}
+        {Body ? <Body key={part} context={context} /> : <NoSection part={part} />}
       </main>
     </>
   );
 }
 
-function Summary({ context, lines }: { context: Context; lines: HealthLine[] }) {
+function Summary({ context }: { context: Context }) {
   const { facts } = context;
-  const { word, text } = summary_of(lines);
+  const { word, text } = summary_of(useHealth(context));
   return (
     <p class="station-summary">
       <a id="station-summary" href={format({ view: 'station', parts: ['health'] })} data-word={word}>

@@ -48,7 +48,7 @@ function AllSessions({ context }: { context: Context }) {
             <tbody>
               {sessions.map((each) => (
                 <tr key={each.session} data-session={each.session}>
-                  <th scope="row" class="number">
+                  <th scope="row" class="number" data-label="Session">
                     {each.session}
                   </th>
                   <td data-label="Who">
