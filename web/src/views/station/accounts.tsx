@@ -37,7 +37,7 @@ function AllAccounts({ context }: { context: Context }) {
   return (
     <div id="station-accounts" class={is_current ? '' : 'was'}>
       <Problem text={asked.problem} />
-      <NewUser context={context} act={act} acts={acts} />
+      <NewUser context={context} act={act} acts={acts} is_edited={edited.value !== ''} />
       <Panel id="station-users" title="Users">
         {users.length === 0 ? (
           <Nothing is_known={asked.answer !== null}>
@@ -81,7 +81,14 @@ function AllAccounts({ context }: { context: Context }) {
 
 type Act = (what: string, request: () => Promise<unknown>) => Promise<boolean>;
 
-function NewUser({ context, act, acts }: { context: Context; act: Act; acts: Acts }) {
+interface NewUserProps {
+  context: Context;
+  act: Act;
+  acts: Acts;
+  is_edited: boolean; // what is refused concerns the one that is changed below
+}
+
+function NewUser({ context, act, acts, is_edited }: NewUserProps) {
   const { api, is_current } = context;
   const name = useSignal('');
   const role = useSignal<Role>('operator');
@@ -137,7 +144,7 @@ function NewUser({ context, act, acts }: { context: Context; act: Act; acts: Act
           Add the user
         </button>
       </form>
-      <Problem id="station-user-problem" text={wrong.value || acts.problem.value} />
+      <Problem id="station-user-problem" text={wrong.value || (is_edited ? '' : acts.problem.value)} />
       {added.value && (
         <div class="station-secret" id="station-user-added" role="status">
           <h2>{added.value.name} may sign in</h2>
@@ -287,7 +294,7 @@ function Edit({ user, context, act, acts, on_done }: EditProps) {
         Keeping out ends their sessions. Removing also revokes their tokens and cannot be undone; what they did stays in
         the audit.
       </p>
-      <Problem text={wrong.value} />
+      <Problem id="station-edit-problem" text={wrong.value || acts.problem.value} />
     </form>
   );
 }

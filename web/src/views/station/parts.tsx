@@ -117,18 +117,19 @@ const kMay = {
 
 // SAFETY: says who may, and nothing of what is there.
 export function ForAdmins({ context, what }: { context: Context; what: string }) {
-  const { me } = context.session;
-  const role = me.value?.role ?? 'viewer';
+  const me = context.session.me.value;
+  if (me === null) return <Nothing is_known={false}>{null}</Nothing>; // who is signed in is not known yet
+  const { role } = me;
   return (
     <div class="waiting station-forbidden" id="station-forbidden">
       <h2>{what} are for admins</h2>
       <p>
-        You are signed in {me.value?.user ? `as ${me.value.user}, ` : 'by link, '}
+        You are signed in {me.user ? `as ${me.user}, ` : 'by link, '}
         {role === 'operator' ? 'an operator' : `a ${role}`}. {kMay[role]}
       </p>
       <p>
-        Ask an admin of this station, or see what{' '}
-        <a href={format({ view: 'station', parts: ['health'] })}>the station’s health</a> is.
+        Ask an admin of this station. How the station does, everybody sees:{' '}
+        <a href={format({ view: 'station', parts: ['health'] })}>Health</a>.
       </p>
     </div>
   );
