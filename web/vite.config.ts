@@ -6,7 +6,7 @@ const station = process.env['RHEONAUT_STATION'] ?? 'http://127.0.0.1:8080';
 const proxied = { target: station, changeOrigin: true };
 
 // What is bundled comes under its authors' terms, which travel with it.
-const third_parties = ['preact', '@preact/signals', '@preact/signals-core', 'uplot', '@fontsource/b612'];
+const third_parties = ['preact', '@preact/signals', '@preact/signals-core', 'uplot', 'uqr', '@fontsource/b612'];
 const licences = () =>
   third_parties
     .map((name) => `${name}\n\n${readFileSync(`node_modules/${name}/LICENSE`, 'utf8').trim()}\n`)

@@ -8,12 +8,14 @@ const axe_source = readFileSync(axe_path, 'utf8');
 const kSizes = [[1440, 900], [1024, 768], [768, 1024], [390, 844], [844, 390]];
 const kRules = ['wcag2a', 'wcag2aa', 'wcag21a', 'wcag21aa', 'wcag22aa', 'best-practice'];
 
-// At each size, and in both themes at the widest one. The page keeps the last size.
-export async function assert_accessible(page, what, sizes = kSizes) {
+const both_at_widest = (width) => (width === 1440 ? ['light', 'dark'] : ['dark']);
+
+// At each size, and in both themes at the widest one if nothing else is said. The page keeps the last size.
+export async function assert_accessible(page, what, sizes = kSizes, themes_at = both_at_widest) {
   for (const [width, height] of sizes) {
     await page.setViewportSize({ width, height });
     await page.waitForTimeout(300); // plots follow
-    for (const colorScheme of width === 1440 ? ['light', 'dark'] : ['dark']) {
+    for (const colorScheme of themes_at(width)) {
       await page.emulateMedia({ colorScheme });
       const at = `${what} at ${width}x${height}, ${colorScheme}`;
       const scroll_width = await page.evaluate(() => document.documentElement.scrollWidth);

@@ -242,8 +242,9 @@ const steps = {
     await page.locator('.top-bar .lamp.good').waitFor();
     await page.locator('#send-setpoint').waitFor(); // an operator has the controls
     await page.click('#open-station');
-    await page.locator('#about-station').waitFor();
-    assert.equal(await page.locator('#access').count(), 0, 'and not the access of others');
+    await page.click('#station-open-sessions');
+    await page.locator('#station-forbidden').waitFor();
+    assert.equal(await page.locator('#station-sessions').count(), 0, 'and not the access of others');
     await page.click('#open-robot');
   },
 

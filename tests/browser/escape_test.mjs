@@ -127,8 +127,8 @@ const steps = {
 
   async 'Escape stops in the view of the station'() {
     await page.click('#open-station');
-    await page.locator('#access').waitFor();
-    await page.locator('#access button').first().focus();
+    await page.click('#station-open-sessions');
+    await page.locator('#station-sessions .guarded').first().focus();
     await escape_stops('a guarded button of the access view');
     await page.click('#open-robot');
     await page.locator('.annunciator h1').waitFor();

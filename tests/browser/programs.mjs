@@ -107,8 +107,8 @@ export class Bench {
     return until('the login link is printed', () => /https?:\/\/\S+\/login\?code=\S+/.exec(this.station.output)?.[0]);
   }
 
-  start_robot(id) {
-    this.robot = new Program('rheonaut-sim', '--station', this.endpoints.robots, '--id', id);
+  start_robot(id, ...options) {
+    this.robot = new Program('rheonaut-sim', '--station', this.endpoints.robots, '--id', id, ...options);
   }
 
   // Robots ID-1 to ID-SIZE in one process.

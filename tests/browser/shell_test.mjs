@@ -18,7 +18,7 @@ const address = () => page.evaluate(() => location.hash);
 const shown = {
   fleet: () => page.locator('#fleet-list li').first().waitFor(),
   robot: () => page.locator('.annunciator h1').getByText(kRobot).waitFor(),
-  station: () => page.locator('#storage').waitFor(),
+  station: () => page.locator('#station-line-recording[data-word=good]').waitFor(),
 };
 const ready = () => until('a stop would work', async () => (await works()) === 'true');
 const drawn = () => page.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done))));

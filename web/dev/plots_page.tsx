@@ -6,8 +6,9 @@
 import '../src/styles';
 import { render } from 'preact';
 import type { RobotState, SamplesMessage } from '../src/api';
-import { Plots, plot_settings } from '../src/parts/plots';
+import { Plots } from '../src/parts/plots';
 import { column_of } from '../src/plots/derived';
+import { plot_settings } from '../src/plots/strips';
 import { Session } from '../src/session';
 
 const kHz = 100;

@@ -222,6 +222,7 @@ export class Session {
 
   private async load_recording(): Promise<void> {
     if (this.phase.peek() !== 'live') return;
+    if (this.me.peek() === null) void this.load(); // the answer did not come in time: without it nobody has controls
     this.recording.value = await this.api.recording().catch(() => this.recording.peek());
   }
 

@@ -23,6 +23,8 @@ import './style/replay.css';
 import './style/experiments.css';
 import './style/experiments_one.css';
 import './style/experiments_queue.css';
+import './style/station.css';
+import './style/station_lists.css';
 import './style/stop.css';
 import './style/small_screens.css';
 import './style/phone.css';

@@ -35,3 +35,20 @@ test('what a page asks chooses no robot', async () => {
   session.store.receive({ type: 'robot', robot: robot('b', 'connected') });
   expect(session.store.selected_id.value).toBe('b');
 });
+
+test('who is signed in is asked again until it is known', async () => {
+  const me = { actor: 'session:1', user: '', role: 'admin', scopes: 'admin' };
+  let asked = 0;
+  vi.stubGlobal('fetch', (path: string) => {
+    if (!path.endsWith('/me')) return Promise.resolve(new Response(JSON.stringify({ runs: [], fluids: [] })));
+    return ++asked === 1 ? Promise.reject(new Error('too slow')) : Promise.resolve(new Response(JSON.stringify(me)));
+  });
+  const session = new Session({ open_socket: () => ({}) as never });
+  session.phase.value = 'live';
+  const look = () => (session as unknown as { load_recording(): Promise<void> }).load_recording(); // each five seconds
+  await look();
+  await vi.waitFor(() => expect(asked).toBe(1));
+  expect(session.me.value).toBeNull();
+  await look();
+  await vi.waitFor(() => expect(session.me.value?.role).toBe('admin'));
+});

@@ -8,13 +8,12 @@ import { PlotBar } from '../plots/plot_bar';
 import { PredictionLoader } from '../plots/prediction_loader';
 import { Scene } from '../plots/scene';
 import { StripHost } from '../plots/strip_host';
-import { PlotSettings } from '../plots/strips';
+import { plot_settings } from '../plots/strips';
 import { clock_label, day_label, stretch_of, TimeAxis } from '../plots/time_axis';
 import { XyPlot } from '../plots/xy_plot';
 import type { Robot } from '../robot';
 import { change_query, route } from '../route';
 import type { Session } from '../session';
-import { browser_shelf } from '../settings';
 import { ThresholdList } from './threshold_list';
 
 const kRingSamples = 65_536; // ten minutes at 100 Hz
@@ -22,8 +21,6 @@ const kSamplesOfTile = 10_000;
 const kAddress_ms = 250; // after the last change of the stretch
 const kMarksAgain_ms = 20_000;
 const kPredictAgain_ms = 5000;
-
-export const plot_settings = new PlotSettings(browser_shelf());
 
 class LiveScene extends Scene {
   private timer = 0;

@@ -4,7 +4,7 @@ import { signal, type Signal } from '@preact/signals';
 import type { StripOptions, Trace } from '../chart';
 import { milliseconds_of_us, millimetres, millimetres_per_s, millivolts, percent } from '../format';
 import type { AnyColumn, Column } from '../samples';
-import type { Shelf } from '../settings';
+import { browser_shelf, type Shelf } from '../settings';
 import { column_of, name_of, parse_spec, type DerivedSpec } from './derived';
 
 export interface TraceChoice extends Trace {
@@ -252,6 +252,9 @@ const derived_strip = (spec: DerivedSpec): Strip => {
     traces: [trace(column, name, column, '--derived', { swatch: 'derived' })],
   };
 };
+
+// Of this page; the switch between local time and UTC is the same in other views.
+export const plot_settings = new PlotSettings(browser_shelf());
 
 // The strips that have at least one chosen trace, with those alone; the band goes with the estimate.
 export function chosen_strips(chosen: readonly string[], derived: readonly DerivedSpec[] = []): Strip[] {

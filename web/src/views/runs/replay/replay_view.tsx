@@ -8,7 +8,7 @@ import { useEffect, useMemo, useRef } from 'preact/hooks';
 import { date_and_time, fluid_text, words } from '../../../format';
 import { LogLines } from '../../../parts/log_strip';
 import { Annunciator } from '../../../parts/mode_annunciator';
-import { plot_settings } from '../../../parts/plots';
+import { plot_settings } from '../../../plots/strips';
 import { Readouts } from '../../../parts/readouts';
 import { PlotBar } from '../../../plots/plot_bar';
 import { StripHost } from '../../../plots/strip_host';
