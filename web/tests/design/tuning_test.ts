@@ -5,7 +5,7 @@ import { rounded, with_specification } from '../../src/views/design/ask';
 import type { MapPoint, Predicted } from '../../src/views/design/design_api';
 import { log_splits, path_of, place_of } from '../../src/views/design/graph';
 import { identify_body } from '../../src/views/design/identify_step';
-import { push_state } from '../../src/views/design/push_step';
+import { float_text, push_state } from '../../src/views/design/push_step';
 import { is_in_region, regions_of } from '../../src/views/design/region_map';
 import { line_of } from '../../src/views/design/step_plots';
 import { inside, summary_of } from '../../src/views/design/tune_result';
@@ -169,6 +169,14 @@ test('a step is called done only when the robot reports it now', () => {
   expect(push_state({ ...situation, runs_it: false }).kind).toBe('ready');
   expect(push_state({ ...situation, problem: 'somebody else is in control' }).kind).toBe('failed');
   expect(push_state({ ...situation, design: kNothing }).kind).toBe('needs');
+});
+
+test('a float32 is written with as few digits as tell it from the next', () => {
+  expect(float_text(Math.fround(30.0669496))).toBe('30.06695');
+  expect(float_text(Math.fround(30.06694960048445))).toBe('30.06695');
+  expect(float_text(Math.fround(-0.1))).toBe('−0.1');
+  expect(float_text(Math.fround(448.58384))).not.toBe(float_text(Math.fround(448.58387)));
+  expect(float_text(null)).toBe('–');
 });
 
 test('states, numbers and robustness in words', () => {

@@ -78,11 +78,12 @@ function Traces({ traces, run_id }: { traces: FitTraces; run_id: number | null }
       lines: [],
     });
     const data: PlotTrace[] = [];
+    // What was recorded lies over the model, as a thin line on a broad one.
+    if (shown.model) data.push({ values: shown.model, colour: '--duty', width_px: 2.5 });
     if (shown.measured) data.push({ values: shown.measured, colour: '--measured', width_px: 1 });
-    if (shown.model) data.push({ values: shown.model, colour: '--duty', width_px: 1.75 });
     const rest: PlotTrace[] = [{ values: shown.residual, colour: '--seen', width_px: 1 }];
     plots.current[0]?.show(content(data), view.value, extremes(data));
-    plots.current[1]?.show(content(rest), view.value, extremes(data.length > 0 ? [...rest] : rest));
+    plots.current[1]?.show(content(rest), view.value, extremes(rest));
   }, [traces, view.value]);
 
   const row = cursor.value === null ? -1 : nearest(traces.time_s, cursor.value);

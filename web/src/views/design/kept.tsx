@@ -54,14 +54,18 @@ export function Kept({ session, work, design, designs, problem, is_asked }: Kept
                 <th scope="col">
                   <span class="unseen">Compare</span>
                 </th>
-                <th scope="col" class="number">
+                <th scope="col" class="less number">
                   Number
                 </th>
                 <th scope="col">Name</th>
                 <th scope="col">Kind</th>
                 <th scope="col">Made from</th>
-                <th scope="col">By</th>
-                <th scope="col">At</th>
+                <th scope="col" class="less">
+                  By
+                </th>
+                <th scope="col" class="less">
+                  At
+                </th>
                 <th scope="col">
                   <span class="unseen">Use</span>
                 </th>
@@ -82,14 +86,14 @@ export function Kept({ session, work, design, designs, problem, is_asked }: Kept
                       onChange={(event) => choose(each.design_id, event.currentTarget.checked)}
                     />
                   </td>
-                  <td class="number">{each.design_id}</td>
+                  <td class="less number">{each.design_id}</td>
                   <td class="name">{each.name}</td>
                   <td>{each.kind}</td>
                   <td>
                     <Ancestry design={each} designs={designs} />
                   </td>
-                  <td>{who(each.made_by, session.store.actor.value)}</td>
-                  <td>{date_and_time(each.made_at_us / 1000)}</td>
+                  <td class="less">{who(each.made_by, session.store.actor.value)}</td>
+                  <td class="less">{date_and_time(each.made_at_us / 1000)}</td>
                   <td>
                     <button type="button" class="design-small" onClick={() => use(each)}>
                       {each.kind === 'model' ? 'Tune for it' : 'Use it'}

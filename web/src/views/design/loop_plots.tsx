@@ -1,6 +1,7 @@
 // The open loop of a design: Bode and Nyquist, with what is asked in magenta.
 
 import { useMemo } from 'preact/hooks';
+import type { Near } from './design_api';
 import { decibels, degrees, loop_at, radians, spaced, type Law, type Plant, type Specification } from './frequency';
 import { Graph, path_of, type Axis, type GraphPoint } from './graph';
 import { number_text } from './words';
@@ -26,10 +27,11 @@ interface LoopProps {
   plant: Plant;
   law: Law | null; // null: nothing meets what is asked
   asked: Specification;
+  near: Near | null; // drawn in its place
   is_final: boolean; // by the station
 }
 
-export function LoopPlots({ plant, law, asked, is_final }: LoopProps) {
+export function LoopPlots({ plant, law, asked, near, is_final }: LoopProps) {
   const loop = useMemo(
     () => (law ? kFrequencies.map((omega_rad_s) => loop_at(plant, law, omega_rad_s)) : []),
     [plant, law],
@@ -37,9 +39,11 @@ export function LoopPlots({ plant, law, asked, is_final }: LoopProps) {
   const { crossover_rad_s, phase_margin_deg } = asked;
   const margin_at = -180 + phase_margin_deg;
   const way = is_final ? '' : 'preliminary';
-  const said = law
-    ? `gain 1 at ${number_text(crossover_rad_s, 3)} rad/s with a phase margin of ${number_text(phase_margin_deg, 3)} degrees`
-    : 'no controller meets what is asked';
+  const said = near
+    ? `nothing meets what is asked; drawn is the nearest, ${number_text(near.crossover_rad_s, 3)} rad/s with ${number_text(near.phase_margin_deg, 3)} degrees`
+    : law
+      ? `gain 1 at ${number_text(crossover_rad_s, 3)} rad/s with a phase margin of ${number_text(phase_margin_deg, 3)} degrees`
+      : 'no controller meets what is asked';
   const magnitude: GraphPoint[] = loop.map((point) => [point.omega_rad_s, decibels(point.magnitude)]);
   const phase: GraphPoint[] = loop.map((point) => [point.omega_rad_s, degrees(point.phase_rad)]);
   const plane: GraphPoint[] = loop
@@ -49,7 +53,8 @@ export function LoopPlots({ plant, law, asked, is_final }: LoopProps) {
     <>
       <figure class="design-figure">
         <figcaption>
-          <b>Bode</b> <span class="quiet">open loop, dB and degrees over rad/s</span>
+          <b>Bode</b>{' '}
+          <span class="quiet">{near ? 'of the nearest that can be had' : 'open loop'}, dB and degrees over rad/s</span>
         </figcaption>
         <Graph
           id="design-bode-magnitude"

@@ -326,6 +326,9 @@ function Coefficients({ rows, robot_id, reported, is_current, name, reason }: Co
   );
 }
 
-// As many digits as tell one float32 from the next.
-const float_text = (value: number | null) =>
-  value === null ? '–' : String(Number(value.toPrecision(9))).replace('-', kMinus);
+// As few digits as tell one float32 from the next.
+export function float_text(value: number | null): string {
+  if (value === null) return '–';
+  const digits = [6, 7, 8].find((count) => Math.fround(Number(value.toPrecision(count))) === Math.fround(value)) ?? 9;
+  return String(Number(value.toPrecision(digits))).replaceAll('-', kMinus);
+}

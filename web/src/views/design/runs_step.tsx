@@ -49,11 +49,15 @@ export function RunsStep({ session, work, design }: StepProps) {
                   <th scope="col">Run</th>
                   <th scope="col">Name</th>
                   <th scope="col">Robot</th>
-                  <th scope="col">Fluid</th>
+                  <th scope="col" class="less">
+                    Fluid
+                  </th>
                   <th scope="col" class="number">
                     Length
                   </th>
-                  <th scope="col">Begun</th>
+                  <th scope="col" class="less">
+                    Begun
+                  </th>
                   <th scope="col" class="number">
                     Lost
                   </th>
@@ -112,9 +116,9 @@ function Row(props: { run: Run; is_in: boolean; is_full: boolean; on_choose(is_i
       </td>
       <td class="name">{run.name}</td>
       <td>{run.robot_id}</td>
-      <td>{run.fluid ? fluid_text(run.fluid) : '–'}</td>
+      <td class="less">{run.fluid ? fluid_text(run.fluid) : '–'}</td>
       <td class="number">{is_open ? 'open' : length_text(run)}</td>
-      <td>{date_and_time(run.started_at_us / 1000)}</td>
+      <td class="less">{date_and_time(run.started_at_us / 1000)}</td>
       <td class={`number ${run.samples_lost > 0 ? 'design-caution' : ''}`}>{count(run.samples_lost)}</td>
     </tr>
   );

@@ -32,7 +32,7 @@ export function curves_of(tuned: Tuned): Curve[] {
 const kMostPoints = 400;
 const kLeast_s = 2;
 
-export function StepPlots({ tuned }: { tuned: Tuned | null }) {
+export function StepPlots({ tuned, is_feasible }: { tuned: Tuned | null; is_feasible: boolean }) {
   const curves = useMemo(() => (tuned ? curves_of(tuned) : []), [tuned]);
   const first = curves[0]?.predicted;
   return (
@@ -54,7 +54,11 @@ export function StepPlots({ tuned }: { tuned: Tuned | null }) {
           </p>
         </>
       ) : (
-        <p class="quiet design-plot-wait">Predicted steps come with the station’s answer.</p>
+        <p class="quiet design-plot-wait">
+          {is_feasible
+            ? 'Predicted steps come with the station’s answer.'
+            : 'There is nothing to predict: no controller meets what is asked.'}
+        </p>
       )}
     </figure>
   );

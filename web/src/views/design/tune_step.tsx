@@ -89,7 +89,8 @@ export function TuneStep(props: StepProps) {
     () => (plant ? solve(plant, asked) : null),
     [plant, asked.crossover_rad_s, asked.phase_margin_deg],
   );
-  const law = tuned ? (tuned.feasible ? tuned : null) : (own?.law ?? null);
+  const near = tuned?.feasible === false ? (tuned.nearest_all[0] ?? null) : null;
+  const law = near ?? (tuned?.feasible ? tuned : (own?.law ?? null));
   const map = work.map.answer.value;
   return (
     <Step
@@ -125,8 +126,8 @@ export function TuneStep(props: StepProps) {
       {plant && (
         <>
           <div class="design-loop" id="design-loop" data-source={tuned ? 'station' : 'page'}>
-            <LoopPlots plant={plant} law={law} asked={asked} is_final={tuned !== null} />
-            <StepPlots tuned={tuned?.feasible ? tuned : null} />
+            <LoopPlots plant={plant} law={law} asked={asked} near={near} is_final={tuned?.feasible === true} />
+            <StepPlots tuned={tuned?.feasible ? tuned : null} is_feasible={tuned?.feasible !== false} />
           </div>
           {tuned?.feasible && <Predictions tuned={tuned} fluids={fluids} />}
         </>
