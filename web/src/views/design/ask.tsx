@@ -102,6 +102,7 @@ interface SliderProps {
 function Slider({ name, label, unit, value, range, bounds, on_slide, on_type }: SliderProps) {
   const problem = useSignal('');
   const { min, max, step, at } = range;
+  useEffect(() => void (problem.value = ''), [value]); // whatever was typed, something else is asked now
   const take = (text: string) => {
     const typed = Number(text.trim().replace(',', '.'));
     const is_in = text.trim() !== '' && typed >= bounds.from && typed <= bounds.to;

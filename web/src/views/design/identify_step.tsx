@@ -9,7 +9,6 @@ import type { Identified } from './design_api';
 import { FitResult } from './fit_result';
 import { is_at_work, type JobBody } from './jobs';
 import type { StepProps } from './parts';
-import { useRuns } from './runs_step';
 import { Step } from './step';
 import { capital, kStructureNames, number_text, state_of } from './words';
 
@@ -112,8 +111,7 @@ export function IdentifyStep(props: StepProps) {
   );
 }
 
-function Options({ session, design }: StepProps) {
-  const runs = useRuns(session, design.runs);
+function Options({ design, runs }: StepProps) {
   const others = (runs.answer?.runs ?? []).filter(
     ({ run_id, state }) => state !== 'open' && !design.runs.includes(run_id),
   );

@@ -7,6 +7,7 @@ import { address_of, note_in_address, parse_design } from './address';
 import { IdentifyStep } from './identify_step';
 import { Kept } from './kept';
 import { PushStep } from './push_step';
+import { useRuns } from './parts';
 import { RunsStep } from './runs_step';
 import { TuneStep } from './tune_step';
 import { VerifyStep } from './verify_step';
@@ -30,13 +31,14 @@ export default function DesignView({ session, route }: ViewProps) {
     if (design.robot !== '') session.store.want(design.robot);
   }, [design.robot]);
 
+  const runs = useRuns(session, [...design.runs, ...(design.verified === null ? [] : [design.verified])]);
   const designs = useAsked(session, work.api.designs, [work.kept.value]);
   const model = useAsked(session, async () => {
     const id = design.model;
     return id === null ? null : { id, found: await work.api.design(id).catch((error: unknown) => refusal(error)) };
   }, [design.model]);
   const model_found = model.answer?.id === design.model ? (model.answer?.found ?? null) : null;
-  const shared = { session, work, design, designs: designs.answer ?? [], model: model_found };
+  const shared = { session, work, design, runs, designs: designs.answer ?? [], model: model_found };
   return (
     <>
       <section class="view-head design-head" aria-label="Steps back and forth">
@@ -83,7 +85,7 @@ function Overview({ work }: { work: DesignWork }) {
             type="button"
             id={`design-to-${name}`}
             title={states[name]?.text}
-            onClick={() => document.getElementById(`design-${name}`)?.scrollIntoView({ block: 'start' })}
+            onClick={() => document.getElementById(`design-part-${name}`)?.scrollIntoView({ block: 'start' })}
           >
             <span class="design-number">{at + 1}</span>
             <span>{title}</span>

@@ -1,20 +1,15 @@
 // Step 1: the runs that a model is to be identified from.
 
-import { useMemo } from 'preact/hooks';
 import { count, date_and_time, fluid_text } from '../../format';
 import { format } from '../../route';
-import { useAsked } from '../experiments/acts';
 import { length_text } from '../runs/record';
-import { RunsApi, type Run } from '../runs/runs_api';
+import type { Run } from '../runs/runs_api';
 import { change_design, kMostRuns, with_run } from './address';
 import type { StepProps } from './parts';
 import { Step } from './step';
 import type { StepState } from './words';
 
-const kShown = 60;
-
-export function RunsStep({ session, work, design }: StepProps) {
-  const runs = useRuns(session, design.runs);
+export function RunsStep({ work, design, runs }: StepProps) {
   const known = runs.answer?.runs ?? [];
   const chosen = known.filter(({ run_id }) => design.runs.includes(run_id));
   return (
@@ -135,16 +130,4 @@ function SameConditions({ runs }: { runs: Run[] }) {
       describe them all.
     </p>
   );
-}
-
-// The newest ones, and those that are chosen however old they are.
-export function useRuns(session: StepProps['session'], chosen: number[]) {
-  const api = useMemo(() => new RunsApi(session.api), []);
-  const open = session.store.runs.value;
-  return useAsked(session, async () => {
-    const newest = await api.page({ robot_id: '', state: '', before: null, limit: kShown });
-    const older = chosen.filter((id) => !newest.some(({ run_id }) => run_id === id));
-    const found = await Promise.all(older.map((id) => api.run(id).catch(() => null)));
-    return { runs: [...newest, ...found.filter((run) => run !== null)] };
-  }, [open, chosen.join(',')]);
 }

@@ -21,7 +21,7 @@ export function Step({ work, number, name, title, state, share = null, on_cancel
   return (
     <section
       class={`design-step ${state.kind}`}
-      id={`design-${name}`}
+      id={`design-part-${name}`}
       data-state={state.kind}
       aria-labelledby={`design-${name}-title`}
     >

@@ -8,7 +8,6 @@ import type { Step as StepMeasures } from '../runs/runs_api';
 import { change_design } from './address';
 import type { Measures, Predicted, Tuned } from './design_api';
 import type { StepProps } from './parts';
-import { useRuns } from './runs_step';
 import { Step } from './step';
 import { fixed_text, type StepState } from './words';
 
@@ -28,9 +27,8 @@ export function predicted_for(
   return step.cause === 'disturbance' && is_of_size(-disturbance_m) ? predicted.disturbance : null;
 }
 
-export function VerifyStep({ session, work, design }: StepProps) {
+export function VerifyStep({ session, work, design, runs }: StepProps) {
   const robot_id = session.store.selected_id.value ?? '';
-  const runs = useRuns(session, design.verified === null ? [] : [design.verified]);
   const own = (runs.answer?.runs ?? []).filter(
     (run) => run.state !== 'open' && (run.robot_id === robot_id || run.run_id === design.verified),
   );
