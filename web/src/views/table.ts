@@ -31,6 +31,7 @@ export const kViews: readonly View[] = [
   { name: 'robot', title: 'Robot', key: 'r', load: () => import('./robot') },
   { name: 'runs', title: 'Runs', key: 'u', load: () => import('./runs/view') },
   { name: 'experiments', title: 'Experiments', key: 'e', load: () => import('./experiments') },
+  { name: 'design', title: 'Design', key: 'd', load: () => import('./design') },
   { name: 'station', title: 'Station', key: 's', load: () => import('./station') },
 ];
 

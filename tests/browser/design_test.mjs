@@ -1,0 +1,224 @@
+// Design on the page: from runs that a simulated robot records to a model, a controller, its way to the robot and back,
+// and the comparison with what was predicted; links, undo, the stop, and how it fits on every screen.
+import assert from 'node:assert/strict';
+import { writeFileSync } from 'node:fs';
+import { join } from 'node:path';
+import { assert_accessible } from './accessible.mjs';
+import { Bench, run, until } from './programs.mjs';
+
+const kRobot = 'sim-1';
+const bench = new Bench();
+let page;
+
+const text = (selector) => page.locator(selector).first().innerText();
+const state = (step) => page.locator(`#design-part-${step}`).getAttribute('data-state');
+const is_in_state = (step, wanted) => until(`step ${step} is ${wanted}`, async () => (await state(step)) === wanted);
+const address = () => page.evaluate(() => decodeURIComponent(location.hash));
+const says = (what) => until(`the address says ${what}`, async () => (await address()).includes(what));
+const of_station = () => until('the station has answered', async () => (await page.locator('#design-achieved').getAttribute('data-source')) === 'station');
+const law = async () => /kp ([\d.]+), kd ([\d.]+), μ ([\d.]+)/.exec(await text('#design-law')).slice(1).map(Number);
+const in_force = async () => (await bench.ask(`/robots/${kRobot}/controller`)).controller;
+
+async function choose(id, option) {
+  await page.click(`#${id}`);
+  await page.locator(`#${id}-list li`).getByText(option).click();
+}
+
+// A robot that does what the profile says, as a script begins it; its run.
+async function recorded(name, limits, steps) {
+  const file = join(bench.data, `${name}.toml`);
+  writeFileSync(file, `name = "${name}"\npurpose = "For the test of the page."\n\n[limits]\n${limits}\n\n${steps}`);
+  await bench.cli(['experiment', 'begin', file, '--robot', kRobot, '--wait']);
+  return (await bench.ask('/runs?limit=1')).runs[0];
+}
+
+const steps = {
+  async 'without a run the view says how to get one, and a model of the paper is there to begin with'() {
+    bench.start_robot(kRobot);
+    await page.goto(await bench.login_link());
+    await page.locator('.annunciator h1').getByText(kRobot).waitFor();
+    await page.keyboard.press('g');
+    await page.keyboard.press('d');
+    await page.locator('#design-part-runs a', { hasText: 'Record an identification set' }).waitFor();
+    assert.deepEqual(await Promise.all(['runs', 'identify', 'tune', 'push'].map(state)), ['needs', 'needs', 'needs', 'needs']);
+    await choose('design-plant', 'fabric softener');
+    await of_station();
+    assert.match(await text('#design-tune-state'), /^done in \d/);
+    const [kp, kd, mu] = await law(); // tests/data/tuning_solutions.json, 3 rad/s and 90 degrees
+    assert.ok(Math.abs(kp - 29.971) < 1e-3 && Math.abs(kd - 0.10524) < 1e-4 && Math.abs(mu - 0.9455) < 1e-4, `${kp}, ${kd}, ${mu}`);
+    await page.locator('#design-map .feasible').first().waitFor();
+    await page.locator('#design-step path.curve').waitFor();
+    assert.match(await text('#design-predicted'), /tuned for\s+1\.8\d/);
+  },
+
+  async 'a slider is followed at once by the page, and when it rests by the station; each rest is a step that is undone'() {
+    const slider = page.locator('#design-margin-slider');
+    const box = await slider.boundingBox();
+    await page.mouse.move(box.x + box.width * 0.52, box.y + box.height / 2);
+    await page.mouse.down();
+    for (const share of [0.54, 0.56, 0.58]) await page.mouse.move(box.x + box.width * share, box.y + box.height / 2);
+    assert.equal(await page.locator('#design-achieved').getAttribute('data-source'), 'page');
+    assert.match(await text('#design-achieved caption'), /by this page, until the slider rests/);
+    assert.equal(await page.locator('#design-bode-phase path.loop.preliminary').count(), 1);
+    const own = await law();
+    await page.mouse.up();
+    await says('margin=');
+    await of_station();
+    const answered = await law();
+    own.forEach((value, at) => assert.ok(Math.abs(value / answered[at] - 1) < 1e-3, `the page ${own}, the station ${answered}`));
+    const margin = await page.locator('#design-margin').inputValue();
+    await page.click('#design-undo');
+    await until('the margin is as before', async () => (await page.locator('#design-margin').inputValue()) === '90');
+    await page.click('#design-redo');
+    await until('and as after', async () => (await page.locator('#design-margin').inputValue()) === margin);
+    await page.goBack();
+    await until('"back" is the same undo', async () => (await page.locator('#design-margin').inputValue()) === '90');
+    assert.ok(await page.locator('#design-undo').isEnabled());
+    assert.ok(await page.locator('#design-redo').isEnabled());
+  },
+
+  async 'what cannot be had says why, what is near, and the map takes a press'() {
+    await page.fill('#design-crossover', '65');
+    await page.press('#design-crossover', 'Enter');
+    await says('crossover=65');
+    await page.fill('#design-margin', '72');
+    await page.press('#design-margin', 'Enter');
+    await is_in_state('tune', 'failed');
+    assert.match(await text('#design-refused'), /theta = 107\.\d+ degrees/);
+    assert.match(await text('#design-map-note'), /outside of the region/);
+    await page.locator('#design-refused button').first().click();
+    await is_in_state('tune', 'done');
+    await page.fill('#design-margin', '500');
+    await page.press('#design-margin', 'Enter');
+    assert.match(await text('.design-slider .problem'), /“500” is no number from 1 to 170 °/);
+    const map = page.locator('#design-map');
+    const { width, height } = await map.boundingBox();
+    await map.click({ position: { x: width * 0.3, y: height * 0.35 } });
+    await until('the map was asked', async () => Number(await page.locator('#design-margin').inputValue()) > 95);
+    await is_in_state('tune', 'done');
+    await choose('design-plant', 'water');
+    await says('paper=28');
+    await of_station();
+  },
+
+  async 'a model is identified from a run, with its progress, and tried on what was not fitted'() {
+    await page.goto(`${bench.http}/#/design`);
+    const { run_id } = await recorded('Excited', 'duty_max = 0.6', '[[step]]\nkind = "rest"\nfor_s = 1\n\n[[step]]\nkind = "prbs"\namplitude = 0.6\nbit_s = 0.2\nfor_s = 10\n');
+    await page.locator(`#design-run-${run_id}`).check();
+    await choose('design-structure', 'second order');
+    await page.fill('#design-to', '8');
+    await page.press('#design-to', 'Enter');
+    await says('to=8');
+    await page.fill('#design-limit', '6');
+    await page.press('#design-limit', 'Enter');
+    await says('limit=6');
+    await choose('design-validation', `the rest of run ${run_id}`);
+    await says(`validation=${run_id}`);
+    await page.click('#design-identify');
+    await is_in_state('identify', 'running');
+    await says('fit=');
+    await is_in_state('identify', 'done');
+    const [, kp, sigma] = /kp m\/s per duty\s+([\d.]+) ± ([\d.]+)/.exec(await text('#design-parameters'));
+    assert.ok(Math.abs(kp - 0.1) < 0.01 && sigma > 0, `kp ${kp} ± ${sigma}`);
+    assert.match(await text('#design-validated'), /tried on run \d+, not fitted\s+9\d\.\d/);
+    await page.locator('.design-fit-data canvas').waitFor();
+    assert.match(await text('.design-sentences'), /the robot’s position is an estimate/);
+    const shown = await text('#design-parameters');
+    await page.reload();
+    await is_in_state('identify', 'done');
+    assert.equal(await text('#design-parameters'), shown, 'a link leads to the same fit');
+    assert.equal(await page.locator('#design-to').inputValue(), '8');
+  },
+
+  async 'the model is kept, tuned for, and the controller goes to the robot and is read back bit for bit'() {
+    await page.fill('#design-model-name', 'softener');
+    await page.click('#design-keep-model');
+    await says('model=1');
+    await of_station();
+    await page.locator('#design-keep-controller:enabled').click();
+    await says('controller=2');
+    await page.locator('#design-coefficients').waitFor();
+    assert.equal(await state('push'), 'ready');
+    const before = await in_force();
+    await page.locator('#design-push:enabled').click();
+    await is_in_state('push', 'done');
+    assert.match(await text('#design-read-back'), /^(\d+) of \1 coefficients are the same bit for bit/);
+    const after = await in_force();
+    assert.notEqual(after.checksum, before.checksum);
+    assert.equal(after.kp, Math.fround((await bench.ask('/designs/2')).document.kp));
+    assert.equal(await page.locator('#control-line').getAttribute('data-holder'), (await bench.ask(`/robots/${kRobot}`)).control.holder);
+    await page.click('#design-restore');
+    await is_in_state('push', 'ready');
+    assert.equal((await in_force()).checksum, before.checksum);
+    await page.locator('#design-push:enabled').click();
+    await is_in_state('push', 'done');
+  },
+
+  async 'what the robot did stands beside what was predicted, and as its belief'() {
+    await page.locator('#release-control').click();
+    await page.locator('#take-control').waitFor();
+    const { run_id } = await recorded('Step', 'position_min_m = -0.3\nposition_max_m = 0.3', '[[step]]\nkind = "setpoint"\nsetpoint_m = 0.1\nfor_s = 4\n');
+    await choose('design-verified', `run ${run_id}: Step`);
+    await page.locator('#design-compared').waitFor();
+    const rows = await text('#design-compared');
+    assert.match(rows, /setpoint, [−\d]+ to 100 mm[\s\S]*estimate ± \d/);
+    assert.match(await text('#design-part-verify'), /says what the robot believed, not where it was/);
+    assert.match(await page.locator('#design-verify-link').getAttribute('href'), /profile=figure_7&robot=sim-1/);
+    await says(`verified=${run_id}`);
+  },
+
+  async 'a link repeats all of it on another page, and models and controllers are listed with their origin'() {
+    const link = await page.evaluate(() => location.href);
+    await page.goto(`${bench.http}/#/fleet`);
+    await page.goto(link);
+    for (const step of ['runs', 'identify', 'tune', 'push', 'verify']) await is_in_state(step, 'done');
+    assert.match(await text('#design-list'), /controller\s+model 1, softener[\s\S]*softener\s+model\s+run 1/);
+    assert.ok(await page.locator('#design-undo').isDisabled(), 'what lies before the view is no step of it');
+    await page.click('#open-fleet');
+    await page.locator('#fleet-list li').first().waitFor();
+    await page.click('#open-design');
+    await is_in_state('verify', 'done');
+    assert.ok((await address()).includes('controller=2'), 'the view goes on where it was left');
+  },
+
+  async 'it fits on every screen, and axe-core finds nothing'() {
+    await assert_accessible(page, 'design');
+    await page.setViewportSize({ width: 1440, height: 900 });
+  },
+
+  async 'nothing can be sent while the page is cut off, and what the robot ran is not shown as present'() {
+    await page.locator('#design-push:enabled').waitFor();
+    await page.clock.install();
+    bench.station.process.kill('SIGSTOP');
+    try {
+      await page.clock.runFor(3000);
+      await page.locator('#design-push:disabled').waitFor();
+      assert.match(await text('#design-push-note'), /Cut off from the station/);
+      assert.match(await text('#design-push-state'), /what it runs now is not known/);
+      assert.equal(await page.locator('#design-coefficients.stale').count(), 1);
+    } finally {
+      bench.station.process.kill('SIGCONT');
+    }
+    await page.clock.resume();
+    await is_in_state('push', 'done');
+  },
+
+  async 'Escape stops the robot while a slider is held, and while a name is typed'() {
+    const is_emergency = async () => (await bench.ask(`/robots/${kRobot}`)).mode === 'emergency';
+    await page.focus('#design-crossover-slider');
+    await page.keyboard.press('Escape');
+    await until('the robot is in emergency', is_emergency);
+    const { emergency_id } = await bench.ask(`/robots/${kRobot}`);
+    assert.equal((await bench.post(`/robots/${kRobot}/commands?wait=verified`, { kind: 'clear_emergency', emergency_id })).status, 200);
+    await page.focus('#design-model-name');
+    await page.keyboard.type('a name');
+    await page.click('#design-plant');
+    await page.keyboard.press('Escape');
+    await until('the robot is in emergency again', is_emergency);
+    await until('the list has closed as well', async () => (await page.locator('#design-plant').getAttribute('aria-expanded')) === 'false');
+  },
+};
+
+await run(bench, steps, async () => {
+  page = await bench.open_browser({ viewport: { width: 1440, height: 900 }, colorScheme: 'dark' });
+});

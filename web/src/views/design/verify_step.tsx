@@ -1,0 +1,181 @@
+// Step 5: the robot shows what the controller does. What it measured stands beside what was predicted.
+
+import { Choice } from '../../parts/choice';
+import { format } from '../../route';
+import { millimetres, plus_minus } from '../../format';
+import { useAsked } from '../experiments/acts';
+import type { Step as StepMeasures } from '../runs/runs_api';
+import { change_design } from './address';
+import type { Measures, Predicted, Tuned } from './design_api';
+import type { StepProps } from './parts';
+import { Step } from './step';
+import { fixed_text, type StepState } from './words';
+
+const kSameSize = 0.05; // relative
+
+// The prediction that a measured step belongs to: by its cause and its size, as `rheonaut autotune` does.
+export function predicted_for(
+  step: Pick<StepMeasures, 'cause' | 'start_m' | 'target_m'>,
+  predicted: Predicted | undefined,
+): Measures | null {
+  if (!predicted) return null;
+  const moved_m = step.target_m - step.start_m;
+  const is_of_size = (size_m: number) => Math.abs(moved_m - size_m) <= kSameSize * Math.abs(size_m);
+  const { setpoint_m, disturbance_m } = predicted.experiment;
+  if (step.cause === 'setpoint' && is_of_size(setpoint_m)) return predicted.step;
+  // After a disturbance the robot comes back from where it seems to be.
+  return step.cause === 'disturbance' && is_of_size(-disturbance_m) ? predicted.disturbance : null;
+}
+
+export function VerifyStep({ session, work, design, runs }: StepProps) {
+  const robot_id = session.store.selected_id.value ?? '';
+  const own = (runs.answer?.runs ?? []).filter(
+    (run) => run.state !== 'open' && (run.robot_id === robot_id || run.run_id === design.verified),
+  );
+  const metrics = useAsked(
+    session,
+    async () =>
+      design.verified === null ? null : { id: design.verified, found: await work.api.metrics(design.verified) },
+    [design.verified],
+  );
+  const found = metrics.answer?.id === design.verified ? (metrics.answer?.found ?? null) : null;
+  const run = own.find(({ run_id }) => run_id === design.verified);
+  const tuned = work.tuning.answer.value.phase === 'done' ? work.tuning.answer.value.result : null;
+  const checksum = session.store.selected.value?.state.value.controller_checksum;
+  const is_other = run !== undefined && run.robot_id === robot_id && run.controller_checksum !== checksum;
+  return (
+    <Step
+      work={work}
+      number={5}
+      name="verify"
+      title="Run and compare"
+      state={verify_state(design, robot_id, metrics.problem)}
+    >
+      <div class="design-columns">
+        <div>
+          <p>
+            <a class="button" id="design-verify-link" href={experiment_link(robot_id)}>
+              Figure 7 on {robot_id || 'a robot'}
+            </a>
+          </p>
+          <p class="quiet design-note">
+            To 0.1 m, and after 20 s a disturbance of −50 mm: 40 s. Nothing moves before “Start” there. Then choose its
+            run here.
+          </p>
+          <span class="design-label">Compare with</span>
+          <Choice
+            id="design-verified"
+            label="Run to compare with the prediction"
+            options={[
+              { value: '', text: 'no run' },
+              ...own.map(({ run_id, name }) => ({ value: String(run_id), text: `run ${run_id}: ${name}` })),
+            ]}
+            value={String(design.verified ?? '')}
+            on_choose={(value) => change_design({ ...design, verified: value === '' ? null : Number(value) })}
+          />
+          {is_other && (
+            <p class="design-caution design-note">
+              Run {run.run_id} was made with another controller than {robot_id} runs now.
+            </p>
+          )}
+        </div>
+        <div>
+          {found === null ? (
+            <p class="quiet design-empty">
+              {metrics.problem !== ''
+                ? metrics.problem
+                : 'What the robot did is shown here, beside what was predicted.'}
+            </p>
+          ) : found.steps.length === 0 ? (
+            <p class="quiet design-empty">Run {design.verified} has no step in auto to compare.</p>
+          ) : (
+            <Compared steps={found.steps} tuned={tuned} run_id={design.verified!} />
+          )}
+        </div>
+      </div>
+    </Step>
+  );
+}
+
+const experiment_link = (robot_id: string) =>
+  format({ view: 'experiments', parts: ['new'], query: { profile: 'figure_7', robot: robot_id } });
+
+function verify_state(design: StepProps['design'], robot_id: string, problem: string): StepState {
+  if (problem !== '') return { kind: 'failed', text: `failed: ${problem}` };
+  if (design.verified !== null) return { kind: 'done', text: `run ${design.verified}` };
+  if (robot_id === '') return { kind: 'needs', text: 'needs a robot' };
+  return { kind: 'ready', text: 'ready' };
+}
+
+function Compared({ steps, tuned, run_id }: { steps: StepMeasures[]; tuned: Tuned | null; run_id: number }) {
+  const predicted = tuned?.feasible ? tuned.predicted[0] : undefined;
+  return (
+    <>
+      <div class="design-scroll-x">
+        <table class="design-table" id="design-compared">
+          <caption>each step, and below it what the model predicts of it</caption>
+          <thead>
+            <tr>
+              <th scope="col">Step</th>
+              <th scope="col" class="number">
+                Settling, s
+              </th>
+              <th scope="col" class="number">
+                Overshoot, %
+              </th>
+              <th scope="col" class="number">
+                Rise, s
+              </th>
+              <th scope="col" class="number">
+                Error, mm
+              </th>
+              <th scope="col">Position by</th>
+            </tr>
+          </thead>
+          <tbody>
+            {steps.map((step, at) => (
+              <Pair key={at} step={step} predicted={predicted_for(step, predicted)} />
+            ))}
+          </tbody>
+        </table>
+      </div>
+      <p class="quiet design-note">
+        A position by the robot’s own estimate says what the robot believed, not where it was.{' '}
+        <a href={format({ view: 'runs', parts: [String(run_id)] })}>Run {run_id} in full</a>
+      </p>
+    </>
+  );
+}
+
+function Pair({ step, predicted }: { step: StepMeasures; predicted: Measures | null }) {
+  const name = `${step.cause}, ${millimetres(step.start_m, 0)} to ${millimetres(step.target_m, 0)} mm`;
+  const source =
+    step.position_source === 'outside' ? 'outside' : step.position_source === 'known' ? 'known' : 'estimate';
+  return (
+    <>
+      <tr>
+        <th scope="row">{name}</th>
+        <Numbers measures={step} />
+        <td>
+          {source} {source !== 'known' && `${plus_minus(step.position_sd_m)} mm`}
+        </td>
+      </tr>
+      <tr class="design-predicted-row">
+        <th scope="row">predicted</th>
+        {predicted ? <Numbers measures={predicted} /> : <td colSpan={4}>of another size than the prediction</td>}
+        <td>{predicted ? 'model' : ''}</td>
+      </tr>
+    </>
+  );
+}
+
+function Numbers({ measures }: { measures: { [name in keyof Measures]?: number | null } }) {
+  return (
+    <>
+      <td class="number">{fixed_text(measures.settling_s, 2)}</td>
+      <td class="number">{fixed_text(measures.overshoot_percent, 1)}</td>
+      <td class="number">{fixed_text(measures.rise_10_90_s, 2)}</td>
+      <td class="number">{millimetres(measures.steady_state_error_m, 2)}</td>
+    </>
+  );
+}
