@@ -1,8 +1,11 @@
 // Who is in control of the robot, for everybody who looks; for operators the ways to take, to ask for and to give it.
 
+import { useSignal } from '@preact/signals';
 import type { ControlBody } from '../api';
+import { useCloseOnEscape } from '../keys';
 import type { Robot } from '../robot';
 import type { Session } from '../session';
+import { GuardedButton } from './hold_button';
 import { OutcomeLine, useAsking } from './request';
 
 export function ControlLine({ session, robot }: { session: Session; robot: Robot }) {
@@ -54,8 +57,53 @@ export function ControlLine({ session, robot }: { session: Session; robot: Robot
           'Ask',
           control.wished_by === me,
         )}
+      {session.me.value?.role === 'admin' && is_current && control !== null && !is_mine && (
+        <Force
+          key={control.holder}
+          pending={asking.pending}
+          on_force={(reason) =>
+            void asking.ask('Take by force', () => session.api.change_control(robot_id, { action: 'force', reason }))
+          }
+        />
+      )}
       <OutcomeLine asking={asking} />
     </div>
+  );
+}
+
+// What is held belongs to one holder: of the next it is another button.
+function Force({ pending, on_force }: { pending: boolean; on_force(reason: string): void }) {
+  const open = useSignal(false);
+  const reason = useSignal('');
+  useCloseOnEscape(() => (open.value = false));
+  const said = reason.value.trim();
+  return (
+    <>
+      <button
+        type="button"
+        id="force-control"
+        aria-expanded={open.value}
+        aria-controls="force-form"
+        onClick={() => (open.value = !open.value)}
+      >
+        By force…
+      </button>
+      {open.value && (
+        <div class="force" id="force-form">
+          <label for="force-reason">Reason, which is stored</label>
+          <input
+            id="force-reason"
+            autoComplete="off"
+            maxLength={200}
+            value={reason.value}
+            onInput={(event) => (reason.value = event.currentTarget.value)}
+          />
+          <GuardedButton id="force-now" disabled={said === '' || pending} on_held={() => on_force(said)}>
+            Hold 1 s to take control by force
+          </GuardedButton>
+        </div>
+      )}
+    </>
   );
 }
 
