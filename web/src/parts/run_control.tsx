@@ -52,7 +52,9 @@ export function RunControl({ session, robot }: { session: Session; robot: Robot 
           robot={robot}
           name={name}
           disabled={link !== 'connected' || asking.pending}
-          on_start={(wanted, fluid) => (wanted === '' ? asking.fail('Give the run a name.') : void start(wanted, fluid))}
+          on_start={(wanted, fluid) =>
+            wanted === '' ? asking.fail('Give the run a name.') : void start(wanted, fluid)
+          }
           on_fluid={set_fluid}
         />
       )}
