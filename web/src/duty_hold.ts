@@ -4,10 +4,12 @@
 // other on their way, so when the hand let go before the first was answered, duty 0 is sent once more after it.
 
 export const kRenew_ms = 150;
+export const kLease_ms = 500; // of the robot, from one renewal to the next
 
 export interface HoldWays {
   set_duty(robot_id: string, duty: number): Promise<unknown>;
   renew_lease(robot_id: string): boolean; // false: the stamp is stale or the link closed, nothing was sent
+  now_ms(): number;
   set_interval(callback: () => void, period_ms: number): unknown;
   clear_interval(timer: unknown): void;
   on_change(): void;
@@ -22,6 +24,7 @@ export class DutyHold {
   private in_flight = 0;
   private stop_again: string | null = null; // a robot whose duty 0 may have been overtaken
   private timer: unknown = null;
+  private renewed_at_ms = 0;
 
   constructor(private readonly ways: HoldWays) {}
 
@@ -31,6 +34,7 @@ export class DutyHold {
     this.duty = duty;
     this.error = null;
     this.lapsed = false;
+    this.renewed_at_ms = this.ways.now_ms();
     this.timer = this.ways.set_interval(() => this.renew(), kRenew_ms);
     void this.send();
     this.ways.on_change();
@@ -66,8 +70,14 @@ export class DutyHold {
     void this.ways.set_duty(robot_id, 0).catch(() => undefined);
   }
 
+  // SAFETY: of a page that stood still for longer than the lease the duty has ended, whatever is fresh now; the hand has to
+  // press again, and nothing says that the motor runs.
   private renew(): void {
-    if (this.robot_id !== null && !this.ways.renew_lease(this.robot_id)) this.lapse();
+    if (this.robot_id === null) return;
+    const now_ms = this.ways.now_ms();
+    const stood_still = now_ms - this.renewed_at_ms > kLease_ms;
+    if (stood_still || !this.ways.renew_lease(this.robot_id)) return this.lapse();
+    this.renewed_at_ms = now_ms;
   }
 
   // The lease could not be renewed.

@@ -3,6 +3,7 @@
 import './styles';
 import { render } from 'preact';
 import { keep_menus_shut, listen_for_stop_key, listen_for_view_keys } from './keys';
+import { follow_build, served_html } from './page_build';
 import { follow_address } from './route';
 import { Session } from './session';
 import { show_in_tab } from './tab';
@@ -13,6 +14,12 @@ follow_address(window);
 listen_for_stop_key(window, session.stop_selected);
 listen_for_view_keys(window, open_view);
 keep_menus_shut(window);
+follow_build({
+  own_html: document.documentElement.outerHTML,
+  phase: session.phase,
+  served_html,
+  set_timer: (callback, delay_ms) => setTimeout(callback, delay_ms),
+});
 session.start();
 show_in_tab(document, session);
 render(<Cockpit session={session} />, document.getElementById('cockpit') as HTMLElement);

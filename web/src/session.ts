@@ -103,6 +103,7 @@ export class Session {
     this.hold = new DutyHold({
       set_duty: (robot_id, duty) => this.api.set_duty(robot_id, duty),
       renew_lease: (robot_id) => this.renew_lease(robot_id),
+      now_ms: () => performance.now(),
       set_interval: (callback, period_ms) => setInterval(callback, period_ms),
       clear_interval: (timer) => clearInterval(timer as number),
       on_change: () => this.on_hold(),

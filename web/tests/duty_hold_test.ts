@@ -1,11 +1,11 @@
 // Hold to run: what is sent while a hand is on the control, and that nothing runs on without it.
 import { expect, test } from 'vitest';
-import { DutyHold, kRenew_ms } from '../src/duty_hold';
+import { DutyHold, kLease_ms, kRenew_ms } from '../src/duty_hold';
 import { FakeTime, settle } from './fakes';
 
 function held(answer: (duty: number) => Promise<unknown> = () => Promise.resolve()) {
   const time = new FakeTime();
-  const world = { time, duties: [] as number[], renewals: 0, fresh: true };
+  const world = { time, duties: [] as number[], renewals: 0, fresh: true, slept_ms: 0 };
   const hold = new DutyHold({
     set_duty: (_, duty) => {
       world.duties.push(duty);
@@ -15,6 +15,7 @@ function held(answer: (duty: number) => Promise<unknown> = () => Promise.resolve
       if (world.fresh) world.renewals += 1;
       return world.fresh;
     },
+    now_ms: () => time.now_ms + world.slept_ms,
     set_interval: (callback, period_ms) => time.set(callback, period_ms, period_ms),
     clear_interval: (timer) => time.clear(timer),
     on_change: () => undefined,
@@ -46,6 +47,19 @@ test('a stale stamp ends the hold for good: 0 is sent, and a fresh stamp does no
   world.fresh = true;
   await world.time.advance(10 * kRenew_ms);
   expect(world.renewals).toBe(1);
+  expect(world.duties).toEqual([0.3, 0]);
+});
+
+// SAFETY: the robot's lease has lapsed meanwhile; the newest of the stamps that have waited may be fresh all the same.
+test('a page that stood still for longer than the lease renews nothing when it goes on, and says so', async () => {
+  const { hold, world } = held();
+  hold.press('rheo-1', 0.3);
+  await world.time.advance(2 * kRenew_ms);
+  world.slept_ms = kLease_ms;
+  await world.time.advance(kRenew_ms);
+  expect(world.renewals).toBe(2);
+  expect(hold.robot_id).toBeNull();
+  expect(hold.lapsed).toBe(true);
   expect(world.duties).toEqual([0.3, 0]);
 });
 

@@ -25,6 +25,7 @@ function page() {
       return Promise.resolve();
     },
     renew_lease: () => true,
+    now_ms: () => 0,
     set_interval: (callback, period_ms) => time.set(callback, period_ms, period_ms),
     clear_interval: (timer) => time.clear(timer),
     on_change: () => undefined,

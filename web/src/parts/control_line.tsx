@@ -2,10 +2,11 @@
 
 import { useSignal } from '@preact/signals';
 import type { ControlBody } from '../api';
+import { useCloseOnEscape } from '../keys';
 import type { Robot } from '../robot';
 import type { Session } from '../session';
 import { GuardedButton } from './hold_button';
-import { OutcomeLine, useAsking, type Asking } from './request';
+import { OutcomeLine, useAsking } from './request';
 
 export function ControlLine({ session, robot }: { session: Session; robot: Robot }) {
   const asking = useAsking();
@@ -16,8 +17,6 @@ export function ControlLine({ session, robot }: { session: Session; robot: Robot
   const may_command = session.me.value?.role !== 'viewer';
   const change = (action: ControlBody['action'], what: string) =>
     void asking.ask(what, () => session.api.change_control(robot_id, { action }));
-  const force = (reason: string) =>
-    void asking.ask('Take control by force', () => session.api.change_control(robot_id, { action: 'force', reason }));
   const key = (id: string, text: string, action: ControlBody['action'], what: string, is_asked = false) => (
     <button
       type="button"
@@ -58,46 +57,53 @@ export function ControlLine({ session, robot }: { session: Session; robot: Robot
           'Ask',
           control.wished_by === me,
         )}
-      {is_current && control !== null && !is_mine && session.me.value?.role === 'admin' && (
-        <ForceControl holder={control.holder} asking={asking} on_force={(reason) => force(reason)} />
+      {session.me.value?.role === 'admin' && is_current && control !== null && !is_mine && (
+        <Force
+          key={control.holder}
+          pending={asking.pending}
+          on_force={(reason) =>
+            void asking.ask('Take by force', () => session.api.change_control(robot_id, { action: 'force', reason }))
+          }
+        />
       )}
       <OutcomeLine asking={asking} />
     </div>
   );
 }
 
-// For administrators: with a reason, which is kept, and by holding the button.
-function ForceControl(props: { holder: string; asking: Asking; on_force(reason: string): void }) {
-  const is_open = useSignal(false);
+// What is held belongs to one holder: of the next it is another button.
+function Force({ pending, on_force }: { pending: boolean; on_force(reason: string): void }) {
+  const open = useSignal(false);
   const reason = useSignal('');
-  if (!is_open.value) {
-    return (
-      <button type="button" id="open-force-control" onClick={() => (is_open.value = true)}>
-        Take by force …
-      </button>
-    );
-  }
+  useCloseOnEscape(() => (open.value = false));
+  const said = reason.value.trim();
   return (
-    <div class="force-control">
-      <label for="force-reason">Why control is taken from {props.holder}</label>
-      <input
-        id="force-reason"
-        autoComplete="off"
-        maxLength={200}
-        value={reason.value}
-        onInput={(event) => (reason.value = event.currentTarget.value)}
-      />
-      <GuardedButton
+    <>
+      <button
+        type="button"
         id="force-control"
-        disabled={reason.value.trim() === '' || props.asking.pending}
-        on_held={() => props.on_force(reason.value.trim())}
+        aria-expanded={open.value}
+        aria-controls="force-form"
+        onClick={() => (open.value = !open.value)}
       >
-        Hold to take control
-      </GuardedButton>
-      <button type="button" onClick={() => (is_open.value = false)}>
-        Leave it
+        By force…
       </button>
-    </div>
+      {open.value && (
+        <div class="force" id="force-form">
+          <label for="force-reason">Reason, which is stored</label>
+          <input
+            id="force-reason"
+            autoComplete="off"
+            maxLength={200}
+            value={reason.value}
+            onInput={(event) => (reason.value = event.currentTarget.value)}
+          />
+          <GuardedButton id="force-now" disabled={said === '' || pending} on_held={() => on_force(said)}>
+            Hold 1 s to take control by force
+          </GuardedButton>
+        </div>
+      )}
+    </>
   );
 }
 

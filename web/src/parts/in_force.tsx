@@ -37,7 +37,7 @@ export function InForce({ session, robot }: { session: Session; robot: Robot }) 
   if (said.value === null) return <p class="quiet">Reading what is in force …</p>;
   const { parameters, controller } = said.value;
   return (
-    <div class="in-force" tabIndex={0} role="region" aria-label={`In force on ${robot_id}`}>
+    <div class="robot-in-force" tabIndex={0} role="region" aria-label={`In force on ${robot_id}`}>
       <dl>
         <dt>Controller</dt>
         <dd id="in-force-controller">{controller_text(controller)}</dd>

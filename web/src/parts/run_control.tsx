@@ -1,6 +1,6 @@
 // A run: the name and fluid that a stretch of the recording is known by. Recording itself never stops.
 
-import { useSignal } from '@preact/signals';
+import { useSignal, type Signal } from '@preact/signals';
 import { useEffect } from 'preact/hooks';
 import type { RunRecord } from '../api';
 import { clock_time, duration, fluid_text } from '../format';
@@ -14,11 +14,15 @@ export function RunControl({ session, robot }: { session: Session; robot: Robot 
   const { store } = session;
   const { robot_id, link } = robot.state.value;
   const asking = useAsking();
+  const name = useSignal(''); // it outlasts the form, which is away while the page is cut off
   const run = store.runs.value.find((other) => other.robot_id === robot_id);
   const is_current = store.is_current.value;
 
-  const start = (name: string, fluid: string) =>
-    asking.ask('Run', async () => store.take_run(await session.api.start_run(robot_id, name, fluid)));
+  const start = (wanted: string, fluid: string) =>
+    asking.ask('Run', async () => {
+      store.take_run(await session.api.start_run(robot_id, wanted, fluid));
+      name.value = '';
+    });
   const set_fluid = (fluid: string) =>
     asking.ask('Fluid of the robot', () => session.api.set_fluid(robot_id, fluid === '' ? null : fluid));
   const end = (run_id: number) =>
@@ -46,8 +50,11 @@ export function RunControl({ session, robot }: { session: Session; robot: Robot 
         <RunForm
           session={session}
           robot={robot}
+          name={name}
           disabled={link !== 'connected' || asking.pending}
-          on_start={(name, fluid) => (name === '' ? asking.fail('Give the run a name.') : void start(name, fluid))}
+          on_start={(wanted, fluid) =>
+            wanted === '' ? asking.fail('Give the run a name.') : void start(wanted, fluid)
+          }
           on_fluid={set_fluid}
         />
       )}
@@ -67,13 +74,13 @@ export function RunControl({ session, robot }: { session: Session; robot: Robot 
 interface RunFormProps {
   session: Session;
   robot: Robot;
+  name: Signal<string>;
   disabled: boolean;
   on_start(name: string, fluid: string): void;
   on_fluid(fluid: string): Promise<boolean>; // it belongs to the robot
 }
 
-function RunForm({ session, robot, disabled, on_start, on_fluid }: RunFormProps) {
-  const name = useSignal('');
+function RunForm({ session, robot, name, disabled, on_start, on_fluid }: RunFormProps) {
   const picked = useSignal<string | null>(null); // null: what the robot is in
   const listed = session.fluids.value;
   const known = robot.state.value.fluid ?? '';

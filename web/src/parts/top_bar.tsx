@@ -1,6 +1,7 @@
 // The top of every view: the way to the others, who is signed in, the stop for every robot, and below that the status.
 
 import { stop_button_keys } from '../keys';
+import { is_outdated } from '../page_build';
 import type { Session } from '../session';
 import { format, route } from '../route';
 import { kViews } from '../views/table';
@@ -55,12 +56,30 @@ export function Notices({ session }: { session: Session }) {
         </strong>
       )}
       <LossBanner session={session} />
+      {is_outdated.value && <Outdated />}
       {security?.certificate?.expires_soon && (
         <span class="lamp caution" title="rheonaut certificate --renew">
           Certificate expires soon
         </span>
       )}
     </div>
+  );
+}
+
+// What runs here goes on; views that were not opened yet may be gone, and the station may mean something else by now.
+function Outdated() {
+  return (
+    <span class="outdated" id="outdated" role="status">
+      <span class="lamp caution">The station has a newer version of this page</span>
+      <button
+        type="button"
+        id="load-new-page"
+        title="What was typed and not sent is lost"
+        onClick={() => location.reload()}
+      >
+        Load it
+      </button>
+    </span>
   );
 }
 

@@ -2,6 +2,7 @@
 // the page, never later.
 
 import { useComputed } from '@preact/signals';
+import { is_outdated } from '../page_build';
 import { StopPanel } from '../parts/stop_panel';
 import { TopBar } from '../parts/top_bar';
 import { format, go_to, route } from '../route';
@@ -55,19 +56,22 @@ export function Cockpit({ session }: { session: Session }) {
 function NotLoaded({ session, view }: { session: Session; view: View }) {
   const { failures } = loader.of(view).value;
   const is_live = session.store.is_current.value;
+  const is_gone = is_outdated.value; // with the version of the page that runs here
   return (
     <main class="view-body" aria-label={view.title}>
       {failures > 0 && (
         <div class="waiting" id="not-loaded" role="status">
           <h2>{view.title} could not be loaded</h2>
           <p>
-            {is_live
-              ? 'The station has another version of this page, perhaps since an update.'
-              : 'The station does not answer. It is tried again each second, and this view comes by itself.'}
+            {is_gone
+              ? 'The station has a newer version of this page, and this view is gone with the one that runs here.'
+              : is_live
+                ? 'It is tried again each second, and this view comes by itself.'
+                : 'The station does not answer. It is tried again each second, and this view comes by itself.'}
           </p>
-          {is_live && (
+          {is_gone && (
             <button type="button" class="primary" id="load-again" onClick={() => location.reload()}>
-              Load the page anew
+              Load the newer page
             </button>
           )}
         </div>

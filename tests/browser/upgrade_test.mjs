@@ -1,0 +1,178 @@
+// The page stays open while the station is replaced by one with another build of it: what runs goes on, the page says that
+// it is older, and what is gone with its version is no broken page. Stop and Escape work all the time.
+//
+// The other build is this one under other names: a proxy in front of the station serves the files of the page from another
+// folder, and nothing any more where they were.
+import assert from 'node:assert/strict';
+import { request as ask_http, createServer } from 'node:http';
+import { connect } from 'node:net';
+import { Bench, run, until } from './programs.mjs';
+
+const kRobot = 'sim-1';
+const bench = new Bench();
+const faults = [];
+let page, front, front_url;
+
+const text = (selector) => page.locator(selector).first().innerText();
+const robot = () => bench.ask(`/robots/${kRobot}`);
+const live = async () => {
+  await page.locator('.top-bar .lamp.good').waitFor();
+  await until('samples arrive', async () => (await page.locator('.readouts.stale').count()) === 0);
+};
+
+// ---- the network in front of the station
+
+let looks = 0; // of a page for what the station serves now
+let build = ''; // the folder of the files of the page, below assets/; '': where they were built
+const streams = new Set();
+
+async function start_front() {
+  front = createServer((asked, answer) => void pass(asked, answer).catch(() => answer.destroy()));
+  front.on('upgrade', (asked, socket) => {
+    const [host, port] = bench.endpoints.http.split(':');
+    const to = connect(Number(port), host, () => {
+      const headers = asked.rawHeaders.flatMap((each, at, all) => (at % 2 === 0 ? [`${each}: ${all[at + 1]}`] : []));
+      to.write(`${asked.method} ${asked.url} HTTP/1.1\r\n${headers.join('\r\n')}\r\n\r\n`);
+      to.pipe(socket).pipe(to);
+    });
+    for (const each of [to, socket]) {
+      streams.add(each);
+      each.on('error', () => undefined);
+      each.on('close', () => (to.destroy(), socket.destroy(), streams.delete(each)));
+    }
+  });
+  await new Promise((done) => front.listen(0, '127.0.0.1', done));
+  front_url = `http://127.0.0.1:${front.address().port}`;
+}
+
+// What is of the page is renamed; all else passes as it is.
+async function pass(asked, answer) {
+  const [, file] = /^\/assets\/(.*)$/.exec(asked.url) ?? [];
+  const is_gone = file !== undefined && !file.startsWith(build);
+  if (is_gone) return void answer.writeHead(404).end();
+  const path = file === undefined ? asked.url : `/assets/${file.slice(build.length)}`;
+  if (asked.url === '/' && asked.headers['sec-fetch-dest'] === 'empty') ++looks;
+  const is_page = file !== undefined || asked.url === '/';
+  const headers = is_page ? { ...asked.headers, 'accept-encoding': 'identity' } : asked.headers;
+  if (is_page) for (const each of ['if-none-match', 'if-modified-since']) delete headers[each];
+  const [hostname, port] = bench.endpoints.http.split(':');
+  const to = ask_http({ hostname, port, path, method: asked.method, headers }, (from) => {
+    if (!is_page) return void from.pipe(answer.writeHead(from.statusCode, from.rawHeaders));
+    const parts = [];
+    from.on('data', (part) => parts.push(part));
+    from.on('end', () => {
+      const is_text = /javascript|html/.test(from.headers['content-type'] ?? '');
+      const whole = Buffer.concat(parts);
+      const body = is_text && build ? Buffer.from(whole.toString().replaceAll('assets/', `assets/${build}`)) : whole;
+      const kept = { ...from.headers, 'content-length': body.length };
+      for (const each of ['transfer-encoding', 'etag']) delete kept[each];
+      answer.writeHead(from.statusCode, kept).end(body);
+    });
+  });
+  to.on('error', () => answer.destroy());
+  asked.pipe(to);
+}
+
+// The station ends, and one with that build begins on the same ports and data.
+async function upgrade(to) {
+  await bench.station.end();
+  build = to;
+  await bench.start_station();
+}
+
+// One press is one stop of the robot; then the latch is taken away again.
+async function escape_stops(what) {
+  await page.keyboard.press('Escape');
+  const { emergency_id } = await until(`Escape stops: ${what}`, async () => {
+    const now = await robot();
+    return now.emergency_id !== null && now;
+  });
+  await page.locator('#latch').waitFor();
+  assert.equal((await bench.post(`/robots/${kRobot}/commands`, { kind: 'clear_emergency', emergency_id })).status, 200);
+  await bench.post(`/robots/${kRobot}/control`, { action: 'release' });
+  await page.locator('#latch').waitFor({ state: 'detached' });
+}
+
+const steps = {
+  async 'a page of the station’s own build says nothing, also after the station was started again'() {
+    bench.start_robot(kRobot);
+    await start_front();
+    await page.goto((await bench.login_link()).replace(bench.http, front_url));
+    await page.locator('.annunciator h1').getByText(kRobot).waitFor();
+    await live();
+    await until('it has looked', () => looks > 0);
+    const before = looks;
+    await upgrade('');
+    await until('it has looked again', () => looks > before);
+    await live();
+    assert.equal(await page.locator('#outdated').count(), 0);
+  },
+
+  async 'after an upgrade the page goes on and says that it is older; nothing that was typed is lost'() {
+    await page.fill('#run-name', 'half a name');
+    await page.evaluate(() => (window.loaded_once = true));
+    await upgrade('second/');
+    await page.locator('#outdated').waitFor();
+    assert.match(await text('#outdated'), /The station has a newer version of this page/);
+    await live();
+    assert.equal(await page.inputValue('#run-name'), 'half a name');
+    assert.ok(await page.evaluate(() => window.loaded_once), 'it was not loaded anew by itself');
+    await escape_stops('on the older page');
+  },
+
+  async 'it drives, and does not load itself anew under the hand that holds a duty'() {
+    const hold = page.locator('#hold-to-run');
+    await until('the duty runs', async () => {
+      await hold.hover();
+      await page.mouse.down();
+      const runs = await until('it runs', async () => (await robot()).sample.duty > 0.1, 5000).catch(() => false);
+      if (!runs) await page.mouse.up(); // the page stood still, and its lease has lapsed
+      return runs;
+    });
+    await upgrade('third/');
+    await until('the motor is off', async () => (await robot()).sample?.duty === 0);
+    await page.locator('#outdated').waitFor();
+    await live();
+    assert.ok(await page.evaluate(() => window.loaded_once));
+    assert.equal((await robot()).sample.duty, 0, 'what is still held moves nothing with another station');
+    await page.mouse.up();
+  },
+
+  async 'a view that was never opened is gone, the page says so, and the stop works there'() {
+    await page.click('#open-station');
+    const gone = page.locator('#not-loaded');
+    await gone.waitFor();
+    assert.match(await gone.innerText(), /The station has a newer version of this page, and this view is gone/);
+    assert.equal(await page.locator('.views [aria-current=page]').getAttribute('id'), 'open-station');
+    await page.focus('#load-again');
+    await escape_stops('in a view that is gone');
+    await page.click('#open-robot');
+    await live(); // what was loaded before is as it was
+  },
+
+  async 'a press loads the newer page, at the same address'() {
+    await page.click('#open-station');
+    await page.click('#load-again');
+    await page.locator('#storage').waitFor();
+    assert.equal(await page.evaluate(() => window.loaded_once ?? false), false);
+    assert.match(await page.evaluate(() => document.querySelector('script[type=module]').src), /\/assets\/third\//);
+    assert.equal(await page.locator('#outdated').count(), 0);
+    await page.click('#open-robot');
+    await live();
+  },
+
+  async 'and so does the notice; a station that is put back is another build as well'() {
+    await upgrade('');
+    await page.locator('#outdated').waitFor();
+    await page.click('#load-new-page');
+    await page.locator('#outdated').waitFor({ state: 'detached' });
+    await live();
+    assert.doesNotMatch(await page.evaluate(() => document.querySelector('script[type=module]').src), /third/);
+    assert.deepEqual(faults, []);
+  },
+};
+
+await run(bench, steps, async () => {
+  page = await bench.open_browser({ viewport: { width: 1440, height: 900 }, colorScheme: 'dark' });
+  page.on('pageerror', (error) => faults.push(error.message));
+});
