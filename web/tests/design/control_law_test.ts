@@ -1,6 +1,7 @@
 // What is sent to a robot, beside what the station made of the same discretisation, and one step of it.
 import { expect, test } from 'vitest';
-import { compared, RunningLaw, sent_form, type Discretised } from '../../src/views/design/control_law';
+import { RunningLaw } from '../../src/running_law';
+import { compared, sent_form, type Discretised } from '../../src/views/design/control_law';
 
 // `discretised` of a job `tune` (3 rad/s, 90°), and what the robot then reported.
 const discretised: Discretised = {

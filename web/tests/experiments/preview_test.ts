@@ -9,19 +9,32 @@ import {
   track_of,
 } from '../../src/views/experiments/preview';
 import { read_profile, variants_of } from '../../src/views/experiments/profile';
+import { sent_form } from '../../src/views/design/control_law';
 import { time_line_of } from '../../src/views/experiments/time_line';
 import { parse_toml, TextError } from '../../src/views/experiments/toml';
 
 const shipped = (name: string) =>
   read_profile(readFileSync(new URL(`../../../server/experiments/profiles/${name}.toml`, import.meta.url), 'utf8'));
 
-// That of the paper, (30), as `rheonaut discretise --json` prints it.
+// That of the paper, (30), as `rheonaut discretise --json` prints it: pole and residue of each section. The robot reports
+// its sections in another form, which sent_form makes.
+const kPrintedSections: [number, number][] = [
+  [0.9820792216378375, -0.03590502460702921],
+  [0.8874037787971211, -0.5380308532140305],
+  [0.6179691844250514, -4.714218933121437],
+  [-0.21026782878561448, 115.72756424136892],
+  [0.16273769235461144, -61.26262787436915],
+];
 const controller = {
-  period_us: 10_000,
-  kp: 65.0028,
-  direct: 61.673366227290465,
-  pole: [0.9820792216378375, 0.8874037787971211, 0.6179691844250514, -0.21026782878561448, 0.16273769235461144],
-  residue: [-0.03590502460702921, -0.5380308532140305, -4.714218933121437, 115.72756424136892, -61.26262787436915],
+  ...sent_form({
+    period_s: 0.01,
+    dc_gain: 65.0028,
+    sections: {
+      direct: 61.673366227290465,
+      first_order: kPrintedSections.map(([pole, residue]) => ({ pole, residue })),
+      second_order: [],
+    },
+  }),
   duty_min: -1,
   duty_max: 1,
 };

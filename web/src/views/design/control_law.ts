@@ -1,9 +1,8 @@
-// The controller as the robot runs it: what a discretisation becomes on its way there, in float32, and one step of it.
+// The controller as the robot holds it: what a discretisation becomes on its way there, in float32.
 //
-//   u = direct · e + Σ residue_i · x_i + Σ biquads,   x_i[k+1] = pole_i · x_i[k] + e[k]      (1)  docs/protocol.md
-//   r/(1 - p z⁻¹) = r + r p/(z - p);   biquads likewise                                      (2)
+//   r/(1 - p z⁻¹) = r + r p/(z - p);   biquads likewise                                      (1)
 //
-// The station does (2) when it sends, and the robot reports (1); control_law_test.ts compares both with what they print.
+// The station does (1) when it sends; control_law_test.ts compares it with what the robot reports.
 
 import type { Controller } from '../../experiments_api';
 
@@ -25,7 +24,7 @@ export interface Discretised {
   errors?: { bandwidth_rad_s: number; max_relative_in_bandwidth: number; max_deg_in_bandwidth: number };
 }
 
-// (2), each number as a float32 holds it.
+// (1), each number as a float32 holds it.
 export function sent_form({ period_s, dc_gain, sections }: Discretised): Controller {
   const { direct, first_order, second_order } = sections;
   const sum =
@@ -67,50 +66,4 @@ export function compared(sent: Controller, reported: Controller | null): Coeffic
     for (let at = 0; at < size; ++at) rows.push(pair(`${list} ${at + 1}`, sent[list]?.[at], reported?.[list]?.[at]));
   }
   return rows;
-}
-
-// (1), with the gain at rest exactly kp, the duty clamped and never written back.
-export class RunningLaw {
-  private readonly first: { pole: number; residue: number; x: number }[];
-  private readonly second: { b0: number; b1: number; a1: number; a2: number; w0: number; w1: number }[];
-  private readonly direct: number;
-
-  constructor(
-    controller: Controller,
-    private readonly duty_min: number,
-    private readonly duty_max: number,
-  ) {
-    const of = (list: (number | null)[] | undefined, at: number) => list?.[at] ?? 0;
-    this.first = (controller.pole ?? []).map((pole, at) => ({
-      pole: pole ?? 0,
-      residue: of(controller.residue, at),
-      x: 0,
-    }));
-    this.second = (controller.biquad_b0 ?? []).map((b0, at) => ({
-      b0: b0 ?? 0,
-      b1: of(controller.biquad_b1, at),
-      a1: of(controller.biquad_a1, at),
-      a2: of(controller.biquad_a2, at),
-      w0: 0,
-      w1: 0,
-    }));
-    const at_rest =
-      this.first.reduce((sum, { pole, residue }) => sum + residue / (1 - pole), 0) +
-      this.second.reduce((sum, { b0, b1, a1, a2 }) => sum + (b0 + b1) / (1 + a1 + a2), 0);
-    this.direct = (controller.kp ?? 0) - at_rest;
-  }
-
-  step(error_m: number): number {
-    let duty = this.direct * error_m;
-    for (const each of this.first) {
-      duty += each.residue * each.x;
-      each.x = each.pole * each.x + error_m;
-    }
-    for (const each of this.second) {
-      duty += each.b0 * each.w0 + each.b1 * each.w1;
-      const next = error_m - each.a1 * each.w0 - each.a2 * each.w1;
-      [each.w1, each.w0] = [each.w0, next];
-    }
-    return Math.min(this.duty_max, Math.max(this.duty_min, duty));
-  }
 }

@@ -3,7 +3,8 @@
 
 import { useMemo } from 'preact/hooks';
 import { fluid_text, millimetres } from '../../format';
-import { RunningLaw, sent_form } from './control_law';
+import { RunningLaw } from '../../running_law';
+import { sent_form } from './control_law';
 import type { Predicted, Tuned } from './design_api';
 import { Graph, path_of, type Axis, type GraphPoint } from './graph';
 import { closed_loop, modes_of, type Response } from './time_response';

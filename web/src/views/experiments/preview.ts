@@ -2,13 +2,14 @@
 // robot, at its tick. The station computes its own prediction before the run, on the model in use; that one is stored.
 //
 //   v = Σ_i y_i,  y_i → p_i y_i + g_i (1 - p_i) u,  p_i = e^(-dt/T_i),  x = ∫v dt          (1)  exact for u held over dt
-//   manual: u = duty;  auto: u = clamp(G(z)(setpoint - (x + disturbance)))                 (2)  G in parallel sections
+//   manual: u = duty;  auto: u = clamp(G(z)(setpoint - (x + disturbance)))                 (2)  running_law.ts
 //
 // Accuracy: the model of (1) has four sections in place of a fractional order; those of the paper's models follow its
 // velocity to 0.15 % of the final one. preview_test.ts compares it with what `rheonaut profile` prints.
 
 import type { CommandLimits, Controller } from '../../experiments_api';
 import { fluid_text, millimetres, percent } from '../../format';
+import { RunningLaw } from '../../running_law';
 import { kTick_s, variants_of, type Profile, type Variant } from './profile';
 import { time_line_of, type TimeLine } from './time_line';
 
@@ -48,54 +49,11 @@ const kPowerDuty = 0.9;
 const kDiverged_m = 1e3;
 export const kMostPoints = 2000; // of a track
 
-// As the robot runs it: `direct` such that the gain at rest is exactly kp, the duty clamped and never written back.
-export class ControlLaw {
-  private readonly first: { pole: number; residue: number; y: number }[];
-  private readonly second: { b0: number; b1: number; a1: number; a2: number; s1: number; s2: number }[];
-  private readonly direct: number;
-
-  constructor(private readonly controller: Controller) {
-    const { pole, residue, biquad_b0, biquad_b1, biquad_a1, biquad_a2, kp } = controller;
-    const of = (list: (number | null)[] | undefined, i: number) => list?.[i] ?? 0;
-    this.first = (pole ?? []).map((p, i) => ({ pole: p ?? 0, residue: of(residue, i), y: 0 }));
-    this.second = (biquad_b0 ?? []).map((b0, i) => ({
-      b0: b0 ?? 0,
-      b1: of(biquad_b1, i),
-      a1: of(biquad_a1, i),
-      a2: of(biquad_a2, i),
-      s1: 0,
-      s2: 0,
-    }));
-    const at_rest =
-      this.first.reduce((sum, { pole, residue }) => sum + residue / (1 - pole), 0) +
-      this.second.reduce((sum, { b0, b1, a1, a2 }) => sum + (b0 + b1) / (1 + a1 + a2), 0);
-    this.direct = (kp ?? 0) - at_rest;
-  }
-
-  reset(): void {
-    for (const each of this.first) each.y = 0;
-    for (const each of this.second) each.s1 = each.s2 = 0;
-  }
-
-  step(error_m: number): number {
-    let sum = this.direct * error_m;
-    for (const each of this.first) sum += each.y = each.residue * error_m + each.pole * each.y;
-    for (const each of this.second) {
-      const y = each.b0 * error_m + each.s1;
-      each.s1 = each.b1 * error_m - each.a1 * y + each.s2;
-      each.s2 = -each.a2 * y;
-      sum += y;
-    }
-    const { duty_min, duty_max } = this.controller;
-    return Math.min(duty_max ?? 1, Math.max(duty_min ?? -1, sum));
-  }
-}
-
 // Calls on_tick after each tick with what holds at its beginning; false ends it.
 type OnTick = (tick: number, position_m: number, duty: number, setpoint_m: number | null) => boolean;
 
 function simulate(line: TimeLine, model: Sections, controller: Controller | null, on_tick: OnTick): void {
-  const law = controller && new ControlLaw(controller);
+  const law = controller && new RunningLaw(controller, controller.duty_min ?? -1, controller.duty_max ?? 1);
   const used = model.model_gain_m_s
     .map((gain, i) => ({ gain, time_s: model.model_time_constant_s[i] ?? 1 }))
     .filter(({ gain }) => gain !== 0);
