@@ -153,7 +153,7 @@ const steps = {
   async 'a press loads the newer page, at the same address'() {
     await page.click('#open-station');
     await page.click('#load-again');
-    await page.locator('#storage').waitFor();
+    await page.locator('#station-health').waitFor();
     assert.equal(await page.evaluate(() => window.loaded_once ?? false), false);
     assert.match(await page.evaluate(() => document.querySelector('script[type=module]').src), /\/assets\/third\//);
     assert.equal(await page.locator('#outdated').count(), 0);

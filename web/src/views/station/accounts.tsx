@@ -189,7 +189,7 @@ function Row({ user, context, is_open, act, acts, on_open }: RowProps) {
           <button
             type="button"
             aria-expanded={is_open}
-            aria-label={`Change ${user.name}`}
+            aria-label={`${is_open ? 'Close' : 'Change'} ${user.name}`}
             onClick={() => on_open(!is_open)}
           >
             {is_open ? 'Close' : 'Change…'}
