@@ -218,7 +218,8 @@ const steps = {
     await picture(other, 'viewer');
 
     await page.click('#open-station');
-    const mark = page.locator('[id^=session-]', { hasText: 'anna' });
+    await page.click('#station-open-sessions');
+    const mark = page.locator('#station-session-list tr[data-session]', { hasText: 'anna' });
     await mark.waitFor();
     await page.locator('#emergency-stop').waitFor(); // stays in reach
     await picture(page, 'access');
