@@ -134,6 +134,10 @@ const steps = {
     await page.fill('#design-model-name', 'softener');
     await page.click('#design-keep-model');
     await says('model=1');
+    // What the recording gives is not the same each time: the specification may be out of reach, and what is near is taken.
+    if (await until('it is tuned, or refused', async () => /done|failed/.exec(await state('tune'))?.[0]) === 'failed') {
+      await page.locator('#design-refused button').first().click();
+    }
     await of_station();
     await page.locator('#design-keep-controller:enabled').click();
     await says('controller=2');

@@ -1,5 +1,5 @@
 PRAGMA application_id = 1382573423;
-PRAGMA user_version = 8;
+PRAGMA user_version = 9;
 BEGIN;
 CREATE TABLE api_token (
   name TEXT PRIMARY KEY,
@@ -98,12 +98,12 @@ CREATE TABLE boot (
   announced_next_seq INTEGER NOT NULL,  -- from its latest Hello: the samples below were made
   last_robot_time_us INTEGER NOT NULL,  -- of the latest Hello or stored sample
   ended_next_seq INTEGER                -- set when a later boot of this robot connected; NULL: may go on
-, durable_next_seq INTEGER NOT NULL DEFAULT 0, durable_next_event_seq INTEGER NOT NULL DEFAULT 0, announced_next_event_seq INTEGER NOT NULL DEFAULT 0, unknown_values TEXT);
-INSERT INTO boot VALUES(1,-81985529216486896,'nemo','power_on','sim-0.1.0',10000,1795427313387022,1795427316194178,177,3190000,181,181,9,8,NULL);
-INSERT INTO boot VALUES(2,4711,'nemo','power_on','sim-0.1.0',10000,1795427316590800,1795427316590800,51,500000,NULL,51,1,1,NULL);
-INSERT INTO boot VALUES(3,-81985529216486895,'r1','brown_out','1.4.0-rc1',10000,1795575966000000,1795575971950000,120,10950000,120,120,9,9,NULL);
-INSERT INTO boot VALUES(4,1,'r1','unknown','1.4.0-rc1',10000,1795575972150000,1795575972150000,15,5140000,NULL,15,0,0,'{"reset_cause":9}');
-INSERT INTO boot VALUES(5,-9223372036854775808,'r2','brown_out','1.4.0-rc1',10000,1795575978150000,1795579566000000,105,3600000000,NULL,105,0,0,NULL);
+, durable_next_seq INTEGER NOT NULL DEFAULT 0, durable_next_event_seq INTEGER NOT NULL DEFAULT 0, announced_next_event_seq INTEGER NOT NULL DEFAULT 0, unknown_values TEXT, grouped_next_seq INTEGER NOT NULL DEFAULT 0);
+INSERT INTO boot VALUES(1,-81985529216486896,'nemo','power_on','sim-0.1.0',10000,1795427313387022,1795427316194178,177,3190000,181,181,9,8,NULL,0);
+INSERT INTO boot VALUES(2,4711,'nemo','power_on','sim-0.1.0',10000,1795427316590800,1795427316590800,51,500000,NULL,51,1,1,NULL,0);
+INSERT INTO boot VALUES(3,-81985529216486895,'r1','brown_out','1.4.0-rc1',10000,1795575966000000,1795575971950000,120,10950000,120,120,9,9,NULL,0);
+INSERT INTO boot VALUES(4,1,'r1','unknown','1.4.0-rc1',10000,1795575972150000,1795575972150000,15,5140000,NULL,15,0,0,'{"reset_cause":9}',0);
+INSERT INTO boot VALUES(5,-9223372036854775808,'r2','brown_out','1.4.0-rc1',10000,1795575978150000,1795579566000000,105,3600000000,NULL,105,0,0,NULL,0);
 CREATE TABLE clock_estimate (       -- of a connected boot, from time to time and at each jump
   boot_key INTEGER NOT NULL REFERENCES boot,
   robot_time_us INTEGER NOT NULL,
@@ -1029,6 +1029,16 @@ CREATE TABLE reservation (
   cancelled_at_us INTEGER,                  -- NULL: it is not
   cancelled_by TEXT NOT NULL DEFAULT ''     -- the actor
 );
+CREATE TABLE segment_group (
+  boot_key INTEGER NOT NULL REFERENCES boot,
+  first_seq INTEGER NOT NULL,      -- of the window
+  last_seq INTEGER NOT NULL,
+  samples INTEGER NOT NULL,        -- that are stored in it
+  first_utc_us INTEGER NOT NULL,   -- of the first of them
+  last_utc_us INTEGER NOT NULL,
+  extremes BLOB NOT NULL,          -- least and largest value of each channel, binary32, little-endian: docs/database.md
+  PRIMARY KEY (boot_key, first_seq)
+) WITHOUT ROWID;
 DELETE FROM sqlite_sequence;
 INSERT INTO sqlite_sequence VALUES('run',7);
 CREATE INDEX boot_by_robot ON boot(robot_id);
@@ -1167,4 +1177,8 @@ CREATE TRIGGER reservation_never_overlaps BEFORE INSERT ON reservation
 WHEN EXISTS (SELECT 1 FROM reservation WHERE robot_id = NEW.robot_id AND cancelled_at_us IS NULL
   AND from_us < NEW.until_us AND NEW.from_us < until_us)
 BEGIN SELECT RAISE(ABORT, 'reservations of one robot never overlap'); END;
+CREATE TRIGGER segment_group_goes_with_a_segment AFTER DELETE ON segment
+BEGIN DELETE FROM segment_group WHERE boot_key = OLD.boot_key AND last_seq >= OLD.first_seq
+  AND first_seq = (SELECT max(first_seq) FROM segment_group
+                   WHERE boot_key = OLD.boot_key AND first_seq <= OLD.first_seq); END;
 COMMIT;

@@ -19,7 +19,7 @@ CREATE TABLE boot (
   announced_next_seq INTEGER NOT NULL,  -- from its latest Hello: the samples below were made
   last_robot_time_us INTEGER NOT NULL,  -- of the latest Hello or stored sample
   ended_next_seq INTEGER                -- set when a later boot of this robot connected; NULL: may go on
-, durable_next_seq INTEGER NOT NULL DEFAULT 0, durable_next_event_seq INTEGER NOT NULL DEFAULT 0, announced_next_event_seq INTEGER NOT NULL DEFAULT 0, unknown_values TEXT);
+, durable_next_seq INTEGER NOT NULL DEFAULT 0, durable_next_event_seq INTEGER NOT NULL DEFAULT 0, announced_next_event_seq INTEGER NOT NULL DEFAULT 0, unknown_values TEXT, grouped_next_seq INTEGER NOT NULL DEFAULT 0);
 CREATE INDEX boot_by_robot ON boot(robot_id);
 CREATE TABLE sample (
   row INTEGER PRIMARY KEY,
@@ -508,3 +508,17 @@ CREATE TRIGGER reservation_never_overlaps BEFORE INSERT ON reservation
 WHEN EXISTS (SELECT 1 FROM reservation WHERE robot_id = NEW.robot_id AND cancelled_at_us IS NULL
   AND from_us < NEW.until_us AND NEW.from_us < until_us)
 BEGIN SELECT RAISE(ABORT, 'reservations of one robot never overlap'); END;
+CREATE TABLE segment_group (
+  boot_key INTEGER NOT NULL REFERENCES boot,
+  first_seq INTEGER NOT NULL,      -- of the window
+  last_seq INTEGER NOT NULL,
+  samples INTEGER NOT NULL,        -- that are stored in it
+  first_utc_us INTEGER NOT NULL,   -- of the first of them
+  last_utc_us INTEGER NOT NULL,
+  extremes BLOB NOT NULL,          -- least and largest value of each channel, binary32, little-endian: docs/database.md
+  PRIMARY KEY (boot_key, first_seq)
+) WITHOUT ROWID;
+CREATE TRIGGER segment_group_goes_with_a_segment AFTER DELETE ON segment
+BEGIN DELETE FROM segment_group WHERE boot_key = OLD.boot_key AND last_seq >= OLD.first_seq
+  AND first_seq = (SELECT max(first_seq) FROM segment_group
+                   WHERE boot_key = OLD.boot_key AND first_seq <= OLD.first_seq); END;

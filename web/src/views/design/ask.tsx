@@ -101,8 +101,13 @@ interface SliderProps {
 
 function Slider({ name, label, unit, value, range, bounds, on_slide, on_type }: SliderProps) {
   const problem = useSignal('');
+  const draft = useSignal<string | null>(null); // what is being typed: an answer that comes meanwhile leaves it alone
   const { min, max, step, at } = range;
-  useEffect(() => void (problem.value = ''), [value]); // whatever was typed, something else is asked now
+  // Whatever was typed, something else is asked now.
+  useEffect(() => {
+    problem.value = '';
+    draft.value = null;
+  }, [value]);
   const take = (text: string) => {
     const typed = Number(text.trim().replace(',', '.'));
     const is_in = text.trim() !== '' && typed >= bounds.from && typed <= bounds.to;
@@ -129,8 +134,9 @@ function Slider({ name, label, unit, value, range, bounds, on_slide, on_type }: 
           aria-label={`${label} in ${unit === '°' ? 'degrees' : unit}`}
           inputMode="decimal"
           autoComplete="off"
-          value={String(value)}
+          value={draft.value ?? String(value)}
           aria-invalid={problem.value !== ''}
+          onInput={(event) => (draft.value = event.currentTarget.value)}
           onChange={(event) => take(event.currentTarget.value)}
         />
         <span class="unit">{unit}</span>

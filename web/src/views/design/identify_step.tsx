@@ -188,6 +188,8 @@ function Seconds(props: {
 }) {
   const { id, label, value, placeholder, least = 0, most = 1e6, on_value } = props;
   const problem = useSignal(false);
+  const draft = useSignal<string | null>(null); // what is being typed: an answer that comes meanwhile leaves it alone
+  useEffect(() => void (draft.value = null), [value]);
   const take = (text: string) => {
     const typed = text.trim().replace(',', '.');
     const number = typed === '' ? null : Number(typed);
@@ -204,8 +206,9 @@ function Seconds(props: {
         inputMode="decimal"
         autoComplete="off"
         placeholder={placeholder}
-        value={value}
+        value={draft.value ?? value}
         aria-invalid={problem.value}
+        onInput={(event) => (draft.value = event.currentTarget.value)}
         onChange={(event) => take(event.currentTarget.value)}
         onKeyDown={(event) => event.key === 'Enter' && take(event.currentTarget.value)}
       />
