@@ -50,7 +50,9 @@ const unfit = []; // all of it is told at the end
 async function fits(where) {
   for (const [width, height] of kSizes) {
     await page.setViewportSize({ width, height });
-    const too_wide = await page.evaluate(() => document.documentElement.scrollWidth - innerWidth);
+    const width_over = () => page.evaluate(() => document.documentElement.scrollWidth - innerWidth);
+    await until('it fits', async () => (await width_over()) <= 0, 10_000).catch(() => undefined); // drawings follow a frame later
+    const too_wide = await width_over();
     if (too_wide > 0) unfit.push(`${where} at ${width} × ${height} scrolls sideways by ${too_wide}`);
     const stop = await page.locator('#emergency-stop').boundingBox();
     if (!(stop && stop.y >= 0 && stop.y + stop.height <= height)) unfit.push(`${where} at ${width} × ${height}: the stop button is not in view`);

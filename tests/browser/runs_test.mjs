@@ -140,8 +140,8 @@ const steps = {
   async 'the cursor reads a value in each plot, with its ± and its time'() {
     const step = (await bench.ask('/runs/1/metrics')).steps[0];
     const at_s = step.at_s + 3; // at rest at 50 mm
-    await look_at(at_s);
     await until('the cursor is there', async () => {
+      await look_at(at_s); // again and again: what is loaded meanwhile may move the plot
       const [, time_s] = /^([\d.]+) s · \d\d:\d\d:\d\d\.\d{3}$/.exec(await text('.cursor-time')) ?? [];
       return Math.abs(Number(time_s) - at_s) < 0.05;
     });
@@ -157,8 +157,10 @@ const steps = {
   async 'the estimate is drawn less the disturbance, from the moment on at which it came'() {
     const disturbed = (await bench.ask('/runs/1/metrics')).steps.find((step) => step.cause === 'disturbance');
     // At rest again under a disturbance of −20 mm: the controller sees 50 mm, the robot is at 70 mm.
-    await look_at(disturbed.at_s + 2.5);
-    await until('70 mm', async () => /^(69|70)\.\d/.test(await text('.strip.position .cursor')));
+    await until('70 mm', async () => {
+      await look_at(disturbed.at_s + 2.5);
+      return /^(69|70)\.\d/.test(await text('.strip.position .cursor'));
+    });
   },
 
   async 'dragging over one plot shows that stretch in all, finer, and the address leads back to it'() {
