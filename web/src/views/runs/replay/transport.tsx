@@ -62,11 +62,11 @@ export function Transport({ replay, whole, gaps_s, note, losses, out_of_reach }:
           value={String(speed)}
           on_choose={(value) => player.set_speed(Number(value))}
         />
-        <output class="moment" id="replay-moment">
+        <output class="replay-moment" id="replay-moment">
           <b>{since_text(at_s, is_playing ? 1 : 3)}</b>
           <span class="quiet"> of {since_text(replay.length_s.value)}</span>
         </output>
-        <time class="moment-clock" id="replay-clock">
+        <time class="replay-clock" id="replay-clock">
           {date_and_time(replay.at_us.value / 1000).slice(0, 10)} {clock_time(Math.floor(replay.at_us.value / 1000))}
         </time>
       </div>
