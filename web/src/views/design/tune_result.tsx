@@ -200,7 +200,7 @@ function MeasuresHead({ name }: { name: string }) {
         <th scope="col" class="number">
           After the disturbance, s
         </th>
-        <th scope="col" />
+        <th scope="col">Note</th>
       </tr>
     </thead>
   );
