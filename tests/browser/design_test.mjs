@@ -150,7 +150,8 @@ const steps = {
     const after = await in_force();
     assert.notEqual(after.checksum, before.checksum);
     assert.equal(Math.fround(after.kp), Math.fround((await bench.ask('/designs/2')).document.kp));
-    assert.equal(await page.locator('#control-line').getAttribute('data-holder'), (await bench.ask(`/robots/${kRobot}`)).control.holder);
+    await until('the page says who is in control', async () =>
+      (await page.locator('#control-line').getAttribute('data-holder')) === (await bench.ask(`/robots/${kRobot}`)).control?.holder);
     await page.click('#design-restore');
     await is_in_state('push', 'ready');
     assert.equal((await in_force()).checksum, before.checksum);
