@@ -17,9 +17,6 @@ const kChromium = {
          '--disable-component-update', '--disable-sync', '--no-first-run'],
 };
 
-// A browser of its own, with processes that nothing else runs in.
-export const another_browser = () => chromium.launch(kChromium);
-
 // Ends a wait for what never comes. It judges no time limit: a busy machine may take many seconds over what the product
 // does in milliseconds.
 const kLongestWait_ms = 60_000;
@@ -117,12 +114,6 @@ export class Bench {
   // Robots ID-1 to ID-SIZE in one process.
   start_fleet(id, size) {
     this.fleet = new Program('rheonaut-sim', '--station', this.endpoints.robots, '--id', id, '--robots', String(size));
-  }
-
-  // A robot whose samples were recorded, `rate` times as fast: ID without its number, which is 1.
-  start_replay(id, rate) {
-    this.fleet = new Program('rheonaut-sim', 'replay', '--station', this.endpoints.robots, '--robots', '1',
-                             '--id', id.replace(/-1$/, ''), '--rate', String(rate));
   }
 
   // The network between a page and the station: `rheonaut-sim proxy`, and the words it is told.
