@@ -19,16 +19,16 @@ float estimated_m(float position_m, float disturbance_m) {
   return static_cast<float>(static_cast<double>(position_m) - static_cast<double>(disturbance_m));
 }
 
-template <std::size_t kCount, class NameOf>
-Result<std::bitset<kCount>> parse_names(std::string_view text, NameOf name_of) {
-  std::bitset<kCount> channels;
+template <std::size_t count, class NameOf>
+Result<std::bitset<count>> parse_names(std::string_view text, NameOf name_of) {
+  std::bitset<count> channels;
   for (bool more = true; more;) {
     const std::size_t comma = text.find(',');
     const std::string_view name = text.substr(0, comma);
     std::size_t index = 0;
-    while (index < kCount && name != name_of(index)) ++index;
-    if (index == kCount || channels[index]) {
-      const char* problem = index == kCount ? "is no channel" : "is given twice";
+    while (index < count && name != name_of(index)) ++index;
+    if (index == count || channels[index]) {
+      const char* problem = index == count ? "is no channel" : "is given twice";
       return fail(ErrorCode::bad_request, fmt::format("channels: '{}' {}", name.substr(0, 40), problem),
                   "out_of_range");
     }
