@@ -112,7 +112,7 @@ test('a lost connection ends nothing: it is looked for again', async () => {
   expect(now().phase).toBe('done');
 });
 
-test('refusals and failures are told in the station’s words', async () => {
+test('refusals and failures are in the station’s words', async () => {
   const refused = asked();
   await refused.station.say(new ApiError('refused', 503, 'too_many_jobs', '20 jobs wait'));
   expect(refused.now()).toMatchObject({ phase: 'failed', error: '20 jobs wait' });
