@@ -209,11 +209,11 @@ void Station::on_parameters(RobotLink& link, const protocol::ParameterPage& page
   RobotState& robot = entry->robot;
   if (const auto record = entry->reported.add(page, moment_of(*entry, parts_->clock))) {
     parts_->notifier.publish(robot, *record);
-    auto changed = entry->reported.settings().parameters.changed_limits();
-    if (changed != robot.changed_limits) {
-      robot.changed_limits = std::move(changed);
-      parts_->notifier.publish(robot);
-    }
+    const ParameterTable& table = entry->reported.settings().parameters;
+    const std::uint32_t checksum_before = std::exchange(robot.parameters_checksum, table.checksum());
+    const auto changed_before = std::exchange(robot.changed_limits, table.changed_limits());
+    const bool is_other = checksum_before != robot.parameters_checksum || changed_before != robot.changed_limits;
+    if (is_other) parts_->notifier.publish(robot);
   }
   const auto sent = entry->commands.to_be_read_back();
   parts_->tracker.on_read_back(*entry, sent, read_back(commands_of(sent), page));

@@ -6,7 +6,7 @@ import time
 import unittest
 import zipfile
 
-from processes import lab
+from processes import commanded, lab
 
 VALIDATOR = pathlib.Path(__file__).with_name("validate_crate.mjs")
 
@@ -17,9 +17,9 @@ class CapsuleTest(unittest.TestCase):
         place.start_robot(station, "sim-1", "--seed", "5")
         station.wait_for_robot("sim-1")
         run = station.post("/api/v1/runs", {"robot_id": "sim-1", "name": "step"})["run_id"]
-        station.post("/api/v1/robots/sim-1/commands", {"kind": "set_mode", "mode": "auto", "setpoint_m": 0.02})
+        commanded(station, "set_mode", mode="auto", setpoint_m=0.02)
         time.sleep(2)
-        station.post("/api/v1/robots/sim-1/commands", {"kind": "set_mode", "mode": "manual"})
+        commanded(station, "set_mode", mode="manual")
         station.post(f"/api/v1/runs/{run}/end", {})
         return run
 

@@ -6,24 +6,21 @@ import json
 import time
 import unittest
 
-from processes import lab, wait_until
+from processes import commanded, lab, wait_until
 
 SETPOINT_M = 0.05
 
 
 class ComparisonTest(unittest.TestCase):
-    def command(self, station, **body):
-        station.post("/api/v1/robots/sim-1/commands", body)
-
     def record(self, station, name, before_s):
         """A step after so long at rest, and back to rest."""
-        self.command(station, kind="set_mode", mode="manual")
-        self.command(station, kind="zero_position")
+        commanded(station, "set_mode", mode="manual")
+        commanded(station, "zero_position")
         # Samples of before may still be on their way, and would be the first of the run.
         wait_until(lambda: station.robot("sim-1")["mode"] == "manual", 20, "manual in telemetry")
         run = station.post("/api/v1/runs", {"robot_id": "sim-1", "name": name})["run_id"]
         time.sleep(before_s)
-        self.command(station, kind="set_mode", mode="auto", setpoint_m=SETPOINT_M)
+        commanded(station, "set_mode", mode="auto", setpoint_m=SETPOINT_M)
         time.sleep(2)
         station.post(f"/api/v1/runs/{run}/end", {})
         return run

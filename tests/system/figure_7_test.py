@@ -8,7 +8,7 @@ import time
 import unittest
 import xml.etree.ElementTree
 
-from processes import ROOT, lab
+from processes import ROOT, commanded, lab
 
 EXAMPLES = ROOT / "examples"
 SVG = "{http://www.w3.org/2000/svg}"
@@ -17,15 +17,15 @@ SETPOINT_M, DISTURBANCE_M = 0.1, -0.05
 
 def record(station):
     """A step to 0.1 m, and a disturbance 3 s later; the run's number."""
-    station.post("/api/v1/robots/sim-1/commands", {"kind": "zero_position"})
+    commanded(station, "zero_position")
     run = station.post("/api/v1/runs", {"robot_id": "sim-1", "name": "Figure 7, short"})["run_id"]
     time.sleep(0.5)
-    station.post("/api/v1/robots/sim-1/commands", {"kind": "set_mode", "mode": "auto", "setpoint_m": SETPOINT_M})
+    commanded(station, "set_mode", mode="auto", setpoint_m=SETPOINT_M)
     time.sleep(3)
-    station.post("/api/v1/robots/sim-1/commands", {"kind": "inject_disturbance", "disturbance_m": DISTURBANCE_M})
+    commanded(station, "inject_disturbance", disturbance_m=DISTURBANCE_M)
     time.sleep(2)
     station.post(f"/api/v1/runs/{run}/end", {})
-    station.post("/api/v1/robots/sim-1/commands", {"kind": "set_mode", "mode": "manual"})
+    commanded(station, "set_mode", mode="manual")
     return run
 
 

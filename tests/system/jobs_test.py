@@ -5,7 +5,7 @@ import sqlite3
 import time
 import unittest
 
-from processes import lab, wait_until
+from processes import commanded, lab, wait_until
 
 JOBS = 8  # begun at once: the last of them wait when the station is killed
 
@@ -13,13 +13,13 @@ JOBS = 8  # begun at once: the last of them wait when the station is killed
 class JobsTest(unittest.TestCase):
     def record(self, station, seconds):
         """A run whose duty changes its sign."""
-        station.post("/api/v1/robots/sim-1/commands", {"kind": "set_mode", "mode": "manual"})
+        commanded(station, "set_mode", mode="manual")
         run = station.post("/api/v1/runs", {"robot_id": "sim-1", "name": "duties"})["run_id"]
         duties = (0.5, -0.5, 0.3, -0.6)
         for step in range(int(seconds / 0.4)):
-            station.post("/api/v1/robots/sim-1/commands", {"kind": "set_duty", "duty": duties[step % len(duties)]})
+            commanded(station, "set_duty", duty=duties[step % len(duties)])
             time.sleep(0.4)
-        station.post("/api/v1/robots/sim-1/commands", {"kind": "set_duty", "duty": 0})
+        commanded(station, "set_duty", duty=0)
         station.post(f"/api/v1/runs/{run}/end", {})
         return run
 

@@ -37,6 +37,7 @@ class ModelTest : public SystemTest {
       EXPECT_EQ(std::bit_cast<std::uint32_t>(*in_force), std::bit_cast<std::uint32_t>(value)) << name;
       expected.set(robot_fw::Parameters::find(name.c_str()).value(), value);
     }
+    EXPECT_EQ(state().parameters_checksum, expected.checksum()) << "computed by the station from what was reported";
     const std::int64_t connected_at_us = state().connected_at_us;
     robot->cut();
     ASSERT_TRUE(clock.run_until([&] { return state().connected_at_us != connected_at_us; }, 5s));

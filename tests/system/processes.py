@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import tempfile
+import time
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "deploy"))
@@ -84,6 +85,17 @@ class Lab:
             except subprocess.TimeoutExpired:
                 process.kill()
                 process.wait()
+
+
+def commanded(station, kind, robot_id="sim-1", **arguments):
+    """The answer to a command. One that a machine which stood still has let expire is given again."""
+    deadline = time.monotonic() + 60
+    while True:
+        try:
+            return station.command(robot_id, kind, **arguments)
+        except ApiError as error:
+            if error.status != 504 or time.monotonic() > deadline:
+                raise
 
 
 @contextlib.contextmanager

@@ -33,6 +33,15 @@ Result<std::int64_t> query_number(const http::Request& request, const std::strin
   return value;
 }
 
+Result<std::optional<bool>> query_flag(const http::Request& request, const std::string& name) {
+  const auto given = request.query.find(name);
+  if (given == request.query.end()) return std::optional<bool>{};
+  if (given->second == "true" || given->second == "false") return given->second == "true";
+  return fail(ErrorCode::bad_request,
+              fmt::format("{} = '{}' is not true or false", name, given->second.substr(0, kMaxQuotedParameter)),
+              "out_of_range");
+}
+
 std::string cursor_text(const storage::SampleCursor& cursor) { return fmt::format("{}-{}", cursor.span, cursor.seq); }
 
 std::optional<storage::SampleCursor> parse_cursor(const std::string& text) {
@@ -74,6 +83,19 @@ Result<std::optional<storage::TimeWindow>> query_window(const http::Request& req
   if (!request.query.contains("from_us") && !request.query.contains("to_us"))
     return std::optional<storage::TimeWindow>{};
   return storage::TimeWindow{*from_us, *to_us};
+}
+
+Result<storage::RecordFilter> query_record_filter(const http::Request& request) {
+  const auto limit = query_number(request, "limit", 1, kMaxLimit, kDefaultLimit);
+  if (!limit) return std::unexpected{limit.error()};
+  const auto window = query_window(request);
+  if (!window) return std::unexpected{window.error()};
+  const auto renewals = query_flag(request, "renewals");
+  if (!renewals) return std::unexpected{renewals.error()};
+  storage::RecordFilter filter{.limit = static_cast<std::size_t>(*limit)};
+  if (*window) filter.window = **window;
+  filter.has_renewals = renewals->value_or(true);
+  return filter;
 }
 
 Result<storage::RunId> run_id_of(const http::Request& request) {

@@ -17,6 +17,9 @@ namespace server::api {
 Result<std::int64_t> query_number(const http::Request& request, const std::string& name, std::int64_t minimum,
                                   std::int64_t maximum, std::int64_t fallback);
 
+// `true` or `false`; none when it is not given.
+Result<std::optional<bool>> query_flag(const http::Request& request, const std::string& name);
+
 // A cursor is "span-seq"; opaque to its users.
 std::string cursor_text(const storage::SampleCursor& cursor);
 std::optional<storage::SampleCursor> parse_cursor(const std::string& text);
@@ -33,6 +36,11 @@ Result<std::optional<storage::TimeWindow>> query_window(const http::Request& req
 
 inline constexpr std::int64_t kMaxRunId = 9'007'199'254'740'991;  // the largest integer that JavaScript holds
 Result<storage::RunId> run_id_of(const http::Request& request);   // of the path
+
+inline constexpr std::int64_t kDefaultLimit = 100;  // of the entries of a list
+inline constexpr std::int64_t kMaxLimit = 1000;
+// `limit`, the window, and for commands `renewals`.
+Result<storage::RecordFilter> query_record_filter(const http::Request& request);
 
 // What the path's run_id or robot_id and the window name.
 Result<storage::Excerpt> run_excerpt(const http::Request& request);

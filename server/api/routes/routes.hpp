@@ -212,9 +212,6 @@ inline station::Author author_of(const http::Request& request, const runtime::Cl
   return {request.actor, request.peer, clock.utc_us()};
 }
 
-inline constexpr std::int64_t kDefaultLimit = 100;
-inline constexpr std::int64_t kMaxLimit = 1000;
-
 http::Response unknown_robot(const std::string& id);  // 404, whatever was asked of it
 
 }  // namespace server::api

@@ -308,9 +308,9 @@ http::Answer emergency_stop_all(CommandRoutes parts, http::Request request) {
 http::Answer list_commands(CommandRoutes parts, http::Request request) {
   const std::string& id = request.param.at("robot_id");
   if (parts.station.find(id) == nullptr) co_return unknown_robot(id);
-  const auto limit = query_number(request, "limit", 1, kMaxLimit, kDefaultLimit);
-  if (!limit) co_return http::problem(limit.error());
-  const auto records = co_await parts.history.commands(id, static_cast<std::size_t>(*limit));
+  const auto filter = query_record_filter(request);
+  if (!filter) co_return http::problem(filter.error());
+  const auto records = co_await parts.history.commands(id, *filter);
   co_return http::json_response(200, list_json("commands", records));
 }
 
@@ -340,7 +340,8 @@ void add_command_routes(http::Router& router, CommandRoutes parts) {
                                     http::Answer (*answer)(CommandRoutes, http::Request)) {
     router.add({method, pattern, needs, std::move(query), with(parts, answer)});
   };
-  add("GET", "/api/v1/robots/{robot_id}/commands", identity::Scope::read, {"limit"}, list_commands);
+  add("GET", "/api/v1/robots/{robot_id}/commands", identity::Scope::read, {"limit", "from_us", "to_us", "renewals"},
+      list_commands);
   add("POST", "/api/v1/robots/{robot_id}/commands", identity::Scope::command, {"wait"}, submit_command);
   add("POST", "/api/v1/robots/{robot_id}/control", identity::Scope::command, {}, change_control);
   add("GET", "/api/v1/commands/{command_id}", identity::Scope::look, {}, get_command);

@@ -111,11 +111,9 @@ http::Answer list_reservations(ReservationRoutes parts, http::Request request) {
   filter.before = *before;
   filter.limit = static_cast<std::size_t>(*limit);
   if (const auto given = request.query.find("robot_id"); given != request.query.end()) filter.robot_id = given->second;
-  if (const auto given = request.query.find("over"); given != request.query.end()) {
-    filter.is_over = given->second == "true";
-    const bool is_flag = *filter.is_over || given->second == "false";
-    if (!is_flag) co_return http::problem(400, "over must be true or false", "out_of_range");
-  }
+  const auto is_over = query_flag(request, "over");
+  if (!is_over) co_return http::problem(is_over.error());
+  filter.is_over = *is_over;
   const auto found = co_await parts.reservations.list(std::move(filter));
   co_return http::json_response(200, list_json("reservations", found));
 }

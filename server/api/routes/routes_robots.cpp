@@ -88,9 +88,9 @@ http::Answer get_robot(RobotRoutes parts, http::Request request) {
 http::Answer list_events(RobotRoutes parts, http::Request request) {
   const std::string& id = request.param.at("robot_id");
   if (parts.station.find(id) == nullptr) co_return unknown_robot(id);
-  const auto limit = query_number(request, "limit", 1, kMaxLimit, kDefaultLimit);
-  if (!limit) co_return http::problem(limit.error());
-  const auto events = co_await parts.history.events(id, static_cast<std::size_t>(*limit));
+  const auto filter = query_record_filter(request);
+  if (!filter) co_return http::problem(filter.error());
+  const auto events = co_await parts.history.events(id, *filter);
   co_return http::json_response(200, list_json("events", events));
 }
 
@@ -103,7 +103,7 @@ void add_robot_routes(http::Router& router, RobotRoutes parts) {
   };
   add("/api/v1/robots", identity::Scope::look, {}, list_robots);
   add("/api/v1/robots/{robot_id}", identity::Scope::look, {}, get_robot);
-  add("/api/v1/robots/{robot_id}/events", identity::Scope::read, {"limit"}, list_events);
+  add("/api/v1/robots/{robot_id}/events", identity::Scope::read, {"limit", "from_us", "to_us"}, list_events);
 }
 
 }  // namespace server::api

@@ -120,9 +120,10 @@ void write_table(std::ostream& out, const Verified& verified, const Verify& opti
     fmt::print(out, "head      {}\n", findings.head.entry == 0 ? "-" : text(findings.head));
   }
   if (verified.store && !verified.integrity_checked && !options.run) {
-    fmt::print(out,
-               "skipped   SQLite's integrity check, since a station runs: its log would grow meanwhile; "
-               "--integrity makes it\n");
+    fmt::print(
+        out,
+        "skipped   SQLite's integrity check, and of the extremes kept for overviews, since a station runs: its log "
+        "would grow meanwhile; --integrity makes them\n");
   }
   fmt::print(out, "{}\n", faults.empty() ? "no faults" : fmt::format("{} faults", faults.size()));
 }

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <boost/crc.hpp>
 #include <string_view>
 #include <utility>
 
@@ -30,6 +31,7 @@ bool ParameterTable::add(const protocol::ParameterPage& page) {
   if (page.total > kMost) return false;
   for (std::size_t i = 0; i < page.parameters_count; ++i) {
     const rheonaut_Parameter& parameter = page.parameters[i];
+    if (page.first_index < kMost) names_[page.first_index + static_cast<std::uint32_t>(i)] = parameter.name;
     if (parameters_.size() < kMost || parameters_.contains(parameter.name)) parameters_[parameter.name] = parameter;
   }
   if (parameters_.empty() || parameters_.size() != page.total) return false;
@@ -41,6 +43,7 @@ bool ParameterTable::add(const protocol::ParameterPage& page) {
 
 void ParameterTable::begin_again() {
   parameters_.clear();
+  names_.clear();
   is_current_ = false;
 }
 
@@ -51,6 +54,18 @@ std::vector<ChangedLimit> ParameterTable::changed_limits() const {
     changed.push_back({name, parameter.unit, parameter.value, parameter.default_value});
   }
   return changed;
+}
+
+std::uint32_t ParameterTable::checksum() const {
+  boost::crc_32_type crc;
+  for (const auto& [index, name] : names_) {
+    const auto parameter = last_known_.find(name);
+    if (parameter == last_known_.end()) continue;
+    crc.process_bytes(name.data(), name.size());
+    const auto value = std::bit_cast<std::uint32_t>(parameter->second.value);
+    for (unsigned shift = 0; shift < 32; shift += 8) crc.process_byte(static_cast<unsigned char>(value >> shift));
+  }
+  return crc.checksum();
 }
 
 bool bounds_motion(const std::string& parameter) {

@@ -3,6 +3,8 @@
 // A robot sends both after each Welcome, and each change. Loop thread; one for each connection.
 #pragma once
 
+#include <cstdint>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -27,6 +29,8 @@ class ParameterTable {
   bool is_current() const { return is_current_; }
   // Of the parameters that bound motion, those that differ from their default.
   std::vector<ChangedLimit> changed_limits() const;
+  // Of last_known(), as the robot computes the one in its Hello (docs/protocol.md); a Hello is older than a change.
+  std::uint32_t checksum() const;
   // The latest that was reported of one of them; none yet.
   std::optional<float> value(const std::string& name) const {
     const auto found = parameters_.find(name);
@@ -37,7 +41,8 @@ class ParameterTable {
   static constexpr std::uint32_t kMost = 256;  // parameters of a robot
 
   ReportedParameters parameters_, last_known_;
-  bool is_current_ = false;  // last_known_ was reported in this connection
+  std::map<std::uint32_t, std::string> names_;  // by index; of the latest reports
+  bool is_current_ = false;                     // last_known_ was reported in this connection
 };
 
 // Whether they are the same bit for bit.

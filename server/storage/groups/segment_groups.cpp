@@ -118,6 +118,7 @@ GroupRun read_groups(SQLite::Database& database, std::int64_t boot_key, Interval
     if (result == SQLITE_DONE) break;
     if (result != SQLITE_ROW) fail_with(database);
     const Interval window{unsigned_at(row, 0), unsigned_at(row, 1) + 1};
+    if (window != group_window(boot_key, window.first)) continue;  // damaged: as if it was not there
     if (window.next > range.next) break;
     if (window.first != next) {
       if (run.groups.empty()) run.next_group = window.first;
@@ -138,6 +139,13 @@ std::vector<Interval> wrong_groups(SQLite::Database& database, std::int64_t boot
   constexpr std::size_t kAtOnce = 1000;
   constexpr std::uint64_t kEnd = std::numeric_limits<std::int64_t>::max();
   std::vector<Interval> wrong;
+  SQLite::Statement rows{database,
+                         "SELECT first_seq, last_seq FROM segment_group WHERE boot_key = ? ORDER BY first_seq"};
+  bind_all(rows, boot_key);
+  while (rows.executeStep()) {
+    const Interval window{unsigned_id(rows.getColumn(0)), unsigned_id(rows.getColumn(1)) + 1};
+    if (window != group_window(boot_key, window.first)) wrong.push_back(window);
+  }
   for (std::uint64_t next = 0; next < kEnd;) {
     const SQLite::Transaction moment{database};
     const GroupRun run = read_groups(database, boot_key, {next, kEnd}, OverviewChannels{}.set(), kAtOnce);

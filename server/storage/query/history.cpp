@@ -171,11 +171,13 @@ asio::awaitable<Result<Overview>> History::overview(Excerpt excerpt, OverviewQue
   co_return overview;
 }
 
-asio::awaitable<std::vector<station::RobotEvent>> History::events(station::RobotId robot_id, std::size_t limit) {
-  auto query = [robot_id, limit](SQLite::Database& database) {
+asio::awaitable<std::vector<station::RobotEvent>> History::events(station::RobotId robot_id, RecordFilter filter) {
+  auto query = [robot_id, filter](SQLite::Database& database) {
     std::vector<station::RobotEvent> events;
-    SQLite::Statement rows{database, select_events("WHERE event.robot_id = ? ORDER BY event_row DESC LIMIT ?")};
-    bind_all(rows, robot_id, clamped(limit));
+    SQLite::Statement rows{database, select_events("WHERE event.robot_id = ? AND event.received_at_us >= ?"
+                                                   " AND event.received_at_us < ?"
+                                                   " ORDER BY event.received_at_us DESC, event_row DESC LIMIT ?")};
+    bind_all(rows, robot_id, filter.window.from_us, filter.window.to_us, clamped(filter.limit));
     while (rows.executeStep()) events.push_back(event_from(rows));
     return events;
   };
@@ -183,11 +185,15 @@ asio::awaitable<std::vector<station::RobotEvent>> History::events(station::Robot
   co_return co_await reader_.ask(std::move(query));
 }
 
-asio::awaitable<std::vector<station::CommandRecord>> History::commands(station::RobotId robot_id, std::size_t limit) {
-  auto query = [robot_id, limit](SQLite::Database& database) {
+asio::awaitable<std::vector<station::CommandRecord>> History::commands(station::RobotId robot_id, RecordFilter filter) {
+  auto query = [robot_id, filter](SQLite::Database& database) {
     std::vector<station::CommandRecord> commands;
-    SQLite::Statement rows{database, select_commands("WHERE robot_id = ? ORDER BY submitted_at_us DESC LIMIT ?")};
-    bind_all(rows, robot_id, clamped(limit));
+    SQLite::Statement rows{database,
+                           select_commands("WHERE robot_id = ? AND submitted_at_us >= ? AND submitted_at_us < ?"
+                                           " AND kind <> ?"
+                                           " ORDER BY submitted_at_us DESC LIMIT ?")};
+    bind_all(rows, robot_id, filter.window.from_us, filter.window.to_us, filter.has_renewals ? "" : "renew_lease",
+             clamped(filter.limit));
     while (rows.executeStep()) commands.push_back(command_from(rows));
     return commands;
   };

@@ -11,6 +11,7 @@
 #include <boost/asio/awaitable.hpp>
 #include <cstdint>
 #include <filesystem>
+#include <limits>
 #include <optional>
 #include <string>
 #include <type_traits>
@@ -51,6 +52,13 @@ struct Overview {
 inline constexpr std::size_t kMaxPageSamples = 10'000;
 inline constexpr std::size_t kMaxPageGaps = 10'000;
 
+// Of the events or the commands of a robot.
+struct RecordFilter {
+  std::size_t limit = 100;  // 1 to 1000
+  TimeWindow window{std::numeric_limits<std::int64_t>::min(), std::numeric_limits<std::int64_t>::max()};
+  bool has_renewals = true;  // false: commands of kind renew_lease are left out
+};
+
 class History {
  public:
   History(std::filesystem::path database, Recorder& recorder, runtime::WorkerThread& readers);
@@ -71,9 +79,9 @@ class History {
                                                                   std::optional<SampleCursor> after = {},
                                                                   std::size_t limit = Recorder::kAll);
 
-  // Newest first, at most `limit` (1 to 1000).
-  boost::asio::awaitable<std::vector<station::RobotEvent>> events(station::RobotId robot_id, std::size_t limit);
-  boost::asio::awaitable<std::vector<station::CommandRecord>> commands(station::RobotId robot_id, std::size_t limit);
+  // Newest first, by the time at which the station received the event, or was asked for the command.
+  boost::asio::awaitable<std::vector<station::RobotEvent>> events(station::RobotId robot_id, RecordFilter filter);
+  boost::asio::awaitable<std::vector<station::CommandRecord>> commands(station::RobotId robot_id, RecordFilter filter);
   boost::asio::awaitable<Result<station::CommandRecord>> command(station::CommandId id);
 
   boost::asio::awaitable<AuditPage> audit(AuditFilter filter);

@@ -321,7 +321,7 @@ CREATE TABLE run (
 , state TEXT NOT NULL DEFAULT 'open', made_afterwards INTEGER NOT NULL DEFAULT 0, made_by TEXT NOT NULL DEFAULT '', profile TEXT NOT NULL DEFAULT '');
 INSERT INTO run VALUES(1,'nemo','A step','non_newtonian','',NULL,'wide','Anna','a note','good','sim-0.1.0',1,2506307638,1807317261,1795427313439145,1795427316559142,'ended',0,'token:local','');
 INSERT INTO run VALUES(2,'nemo','Cut off','','',NULL,'','','','','sim-0.1.0',1,2506307638,1807317261,1795427316792272,1795427317090408,'interrupted',0,'token:local','');
-INSERT INTO run VALUES(3,'r1','Lauf 3 – 漢字 🐟','oil','pulse',-0.1,'6 mm, "soft"','Zoë','what was said before is kept ✓','usable – mostly','1.4.0-rc1',7,4294967295,3735928559,1795575966008000,1795575974150000,'ended',0,'token:local','');
+INSERT INTO run VALUES(3,'r1','Lauf 3 – 漢字 🐟','oil','pulse',-0.1,'6 mm, "soft"','Zoë','what was said before is kept ✓','usable – mostly','1.4.0-rc1',7,4294967295,2696680644,1795575966008000,1795575974150000,'ended',0,'token:local','');
 INSERT INTO run VALUES(4,'r1','afterwards','','',NULL,'','','','','1.4.0-rc1',7,0,0,1795575966146000,1795575966436000,'ended',1,'token:local','');
 INSERT INTO run VALUES(5,'r1','discarded','','',NULL,'','','','','1.4.0-rc1',7,0,0,1795575965996000,1795575966086000,'discarded',1,'token:local','');
 INSERT INTO run VALUES(6,'r1','open when the station stopped','oil','',NULL,'','','','','1.4.0-rc1',7,4294967295,3735928559,1795575983150000,1795575983150000,'interrupted',0,'token:local','');
@@ -1043,7 +1043,6 @@ DELETE FROM sqlite_sequence;
 INSERT INTO sqlite_sequence VALUES('run',7);
 CREATE INDEX boot_by_robot ON boot(robot_id);
 CREATE UNIQUE INDEX segment_by_seq ON segment(boot_key, first_seq);
-CREATE INDEX event_by_robot ON event(robot_id);
 CREATE UNIQUE INDEX event_by_seq ON event(boot_key, event_seq) WHERE event_seq IS NOT NULL;
 CREATE INDEX command_by_robot ON command(robot_id, submitted_at_us);
 CREATE INDEX command_unfinished ON command(kind) WHERE state IN ('queued', 'sent');
@@ -1181,4 +1180,5 @@ CREATE TRIGGER segment_group_goes_with_a_segment AFTER DELETE ON segment
 BEGIN DELETE FROM segment_group WHERE boot_key = OLD.boot_key AND last_seq >= OLD.first_seq
   AND first_seq = (SELECT max(first_seq) FROM segment_group
                    WHERE boot_key = OLD.boot_key AND first_seq <= OLD.first_seq); END;
+CREATE INDEX event_by_time ON event(robot_id, received_at_us);
 COMMIT;

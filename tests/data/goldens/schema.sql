@@ -86,7 +86,6 @@ CREATE TABLE event (
   command_id INTEGER NOT NULL,
   received_at_us INTEGER NOT NULL
 , emergency_cause TEXT, detail TEXT NOT NULL DEFAULT '', unknown_values TEXT);
-CREATE INDEX event_by_robot ON event(robot_id);
 CREATE UNIQUE INDEX event_by_seq ON event(boot_key, event_seq) WHERE event_seq IS NOT NULL;
 CREATE TABLE event_gap (  -- events that are lost for good
   boot_key INTEGER NOT NULL REFERENCES boot,
@@ -522,3 +521,4 @@ CREATE TRIGGER segment_group_goes_with_a_segment AFTER DELETE ON segment
 BEGIN DELETE FROM segment_group WHERE boot_key = OLD.boot_key AND last_seq >= OLD.first_seq
   AND first_seq = (SELECT max(first_seq) FROM segment_group
                    WHERE boot_key = OLD.boot_key AND first_seq <= OLD.first_seq); END;
+CREATE INDEX event_by_time ON event(robot_id, received_at_us);

@@ -175,8 +175,8 @@ TEST_F(HistoryTest, QueriesOfEventsAndCommandsCutNoSegmentShort) {
     event.robot_id = robot_.id;
     event.kind = "event " + std::to_string(n);
     recorder_->on_event(state_of(robot_, station::LinkState::connected), event);
-    EXPECT_EQ(wait(history_->events(robot_.id, 1)).at(0).kind, event.kind);
-    EXPECT_EQ(wait(history_->commands(robot_.id, 1)).size(), 0u);
+    EXPECT_EQ(wait(history_->events(robot_.id, {.limit = 1})).at(0).kind, event.kind);
+    EXPECT_EQ(wait(history_->commands(robot_.id, {.limit = 1})).size(), 0u);
     clock_.run_for(1ms);
   }
   clock_.run_for(2s);
@@ -232,7 +232,7 @@ TEST_F(HistoryTest, GivesBackEventsAndCommandsNewestFirst) {
     command.submitted_at_us = static_cast<std::int64_t>(n);
     recorder_->on_command(command);
   }
-  const std::vector<station::RobotEvent> events = wait(history_->events(robot_.id, 10));
+  const std::vector<station::RobotEvent> events = wait(history_->events(robot_.id, {.limit = 10}));
   ASSERT_EQ(events.size(), 3u);
   EXPECT_EQ(events[0].kind, "event 2");
   EXPECT_EQ(events[0].boot_id, robot_.boot_id);
@@ -241,11 +241,38 @@ TEST_F(HistoryTest, GivesBackEventsAndCommandsNewestFirst) {
   EXPECT_EQ(events[0].emergency_id, 0xf000000000000001);
   EXPECT_EQ(events[2].boot_id, 0u);
   EXPECT_FALSE(events[2].event_seq.has_value());
-  EXPECT_EQ(wait(history_->events(robot_.id, 2)).size(), 2u);
-  const std::vector<station::CommandRecord> commands = wait(history_->commands(robot_.id, 2));
+  EXPECT_EQ(wait(history_->events(robot_.id, {.limit = 2})).size(), 2u);
+  const std::vector<station::CommandRecord> commands = wait(history_->commands(robot_.id, {.limit = 2}));
   ASSERT_EQ(commands.size(), 2u);
   EXPECT_EQ(commands[0].id, 0xf000000000000002);
   EXPECT_EQ(wait(history_->command(0xf000000000000001))->state, station::CommandState::acknowledged);
+}
+
+TEST_F(HistoryTest, EventsAndCommandsOfAWindowOfTimeAndCommandsWithoutRenewals) {
+  start();
+  connect(robot_);
+  for (std::int64_t second = 1; second <= 4; ++second) {
+    station::RobotEvent event;
+    event.robot_id = robot_.id;
+    event.kind = fmt::format("event {}", second);
+    event.received_at_us = second * 1'000'000;
+    recorder_->on_event(state_of(robot_, station::LinkState::connected), event);
+    station::CommandRecord command;
+    command.id = static_cast<station::CommandId>(second);
+    command.robot_id = robot_.id;
+    command.kind = second == 2 ? "set_duty" : "renew_lease";
+    command.submitted_at_us = event.received_at_us;
+    recorder_->on_command(command);
+  }
+  const storage::TimeWindow window{2'000'000, 4'000'000};  // without its end
+  const std::vector<station::RobotEvent> events = wait(history_->events(robot_.id, {.window = window}));
+  ASSERT_EQ(events.size(), 2u);
+  EXPECT_EQ(events[0].kind, "event 3");
+  EXPECT_EQ(events[1].kind, "event 2");
+  EXPECT_EQ(wait(history_->commands(robot_.id, {.window = window})).size(), 2u);
+  const auto without = wait(history_->commands(robot_.id, {.limit = 1, .has_renewals = false}));
+  ASSERT_EQ(without.size(), 1u) << "renewals do not count";
+  EXPECT_EQ(without[0].id, 2u);
 }
 
 }  // namespace

@@ -140,6 +140,18 @@ TEST_F(SegmentGroupsTest, VerifyFindsAGroupThatIsNotWhatItsSegmentsSay) {
                                      ::testing::StartsWith("the group of samples 12800 to 19199")));
 }
 
+TEST_F(SegmentGroupsTest, ARowWhoseNumbersAreNoWindowIsPassedOverAndNamed) {
+  const storage::RunId run = record_plain(45'000);
+  make_groups();
+  change("UPDATE segment_group SET last_seq = 6399 WHERE first_seq = 6400");
+  change("UPDATE segment_group SET last_seq = 9223372036854775807 WHERE first_seq = 19200");
+  EXPECT_EQ(overview(storage::excerpt_of(run), 7).columns.samples.size(), 7u);
+  SQLite::Database database = storage::open_for_reading(path_);
+  EXPECT_THAT(storage::check_store(database, {.run = {}, .integrity = true}).value().faults,
+              ::testing::ElementsAre(::testing::StartsWith("the group of samples 6400 to 6399 of boot key 1"),
+                                     ::testing::StartsWith("the group of samples 19200 to 9223372036854775807")));
+}
+
 // Such as versions before this one may have stored.
 TEST_F(SegmentGroupsTest, AWindowIntoWhichASegmentReachesHasNone) {
   const storage::RunId run = record_plain(20'000);

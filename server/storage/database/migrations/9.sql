@@ -1,6 +1,7 @@
--- The ninth migration: a second level of extremes, for overviews of days and months.
+-- The ninth migration: a second level of extremes, for overviews of days and months; events by their time.
 --
--- It adds a table and a column; the station makes the rows in the background (server/storage/groups/segment_groups.hpp).
+-- It adds a table, a column and an index; the station makes the rows in the background
+-- (server/storage/groups/segment_groups.hpp).
 
 -- The extremes of all segments of a boot in a window of 6400 numbers in which every sample is stored or lost. Everything
 -- in it follows from the segments; rows may be missing.
@@ -23,3 +24,7 @@ CREATE TRIGGER segment_group_goes_with_a_segment AFTER DELETE ON segment
 BEGIN DELETE FROM segment_group WHERE boot_key = OLD.boot_key AND last_seq >= OLD.first_seq
   AND first_seq = (SELECT max(first_seq) FROM segment_group
                    WHERE boot_key = OLD.boot_key AND first_seq <= OLD.first_seq); END;
+
+-- Events of a window of time are found without reading all of the robot.
+CREATE INDEX event_by_time ON event(robot_id, received_at_us);
+DROP INDEX event_by_robot;

@@ -209,7 +209,7 @@ CREATE TABLE run(
   made_by TEXT,
   profile TEXT
 );
-INSERT INTO run VALUES(3,'r1','Lauf 3 – 漢字 🐟','oil','pulse',-0.1,'6 mm, "soft"','Zoë','what was said before is kept ✓','usable – mostly','1.4.0-rc1',7,4294967295,3735928559,1795575966008000,1795575974150000,'ended',0,'token:local','');
+INSERT INTO run VALUES(3,'r1','Lauf 3 – 漢字 🐟','oil','pulse',-0.1,'6 mm, "soft"','Zoë','what was said before is kept ✓','usable – mostly','1.4.0-rc1',7,4294967295,2696680644,1795575966008000,1795575974150000,'ended',0,'token:local','');
 CREATE TABLE span(
   span INT,
   boot_id,
