@@ -31,7 +31,7 @@ json specification(const AutotuneRequest& request) {
 
 // What an ended job or experiment says of its end, in words.
 std::string why(const json& ended) {
-  for (const char* name : {"error", "reason"}) {
+  for (const char* name : {"error", "detail", "reason"}) {
     const json given = ended.value(name, json());
     if (given.is_string() && !given.get<std::string>().empty()) return ": " + given.get<std::string>();
   }

@@ -11,6 +11,8 @@ namespace server::experiments {
 namespace {
 
 constexpr double kPowerDuty = 0.9;
+constexpr const char* kDutyAdvice =
+    ": the motor does not take every duty of the profile; one that runs one way only takes none below 0";
 
 }  // namespace
 
@@ -27,7 +29,9 @@ std::optional<Abort> fault_of(const station::CommandRecord& accepted) {
   if (!has_failed || is_unseen) return std::nullopt;
   const std::string state = text(accepted.state);
   const std::string reason = accepted.reason.empty() || accepted.reason == state ? "" : ", " + accepted.reason;
-  return Abort{"command_refused", fmt::format("{}: {}{}", accepted.kind, state, reason)};
+  const bool is_duty = accepted.kind == "set_duty" || accepted.kind == "set_duty_schedule";
+  const char* advice = is_duty && accepted.reason == "out_of_range" ? kDutyAdvice : "";
+  return Abort{"command_refused", fmt::format("{}: {}{}{}", accepted.kind, state, reason, advice)};
 }
 
 void AbortWatch::on_samples(const station::SampleBatch& batch, std::int64_t now_us) {

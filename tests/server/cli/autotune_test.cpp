@@ -106,7 +106,10 @@ class PlayedStation {
     const bool is_running = ++looks_[number] < 3;
     const std::string end = experiment_ends.contains(number) ? experiment_ends.at(number) : "done";
     json answer{{"experiment_id", number}, {"state", is_running ? "running" : end}, {"reason", ""}};
-    if (end != "done") answer["reason"] = "position_sd_m is above 0.03";
+    if (end != "done") {
+      answer["reason"] = "position_sd";
+      answer["detail"] = "position_sd_m is above 0.03";
+    }
     answer["runs"] = {{{"index", 0}, {"run_id", 100 + number}, {"state", is_running ? "recording" : "ended"}}};
     answer["progress"] = {{"share", 0.5}, {"stage", "step 2 of 9"}};
     return answer;

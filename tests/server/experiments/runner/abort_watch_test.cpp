@@ -1,6 +1,7 @@
 // The abort criteria: each is met by what it is for, and by nothing just inside its bound.
 #include "server/experiments/runner/abort_watch.hpp"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <limits>
@@ -134,6 +135,11 @@ TEST(FaultOfACommand, IsWhatTheRobotDidNotDo) {
     record.state = state;
     EXPECT_EQ(fault_of(record)->reason, "command_refused") << text(state);
   }
+  record.kind = "set_duty_schedule";
+  record.state = CommandState::rejected;
+  record.reason = "out_of_range";
+  EXPECT_THAT(fault_of(record)->detail, ::testing::HasSubstr("runs one way only"));
+  record.kind = "set_setpoint";
   record.state = CommandState::superseded;
   for (const char* reason : {"control_ended", "by_emergency_stop", "limits_changed"}) {
     record.reason = reason;
