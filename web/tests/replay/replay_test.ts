@@ -111,12 +111,11 @@ test('it lists what had happened until then, the newest first, and nothing of la
   const replay = await replay_of(samples(0, 2500));
   const event = { robot_id: 'rheo-1', boot_id: '11', event_seq: 4, received_at_us: at(900), kind: 'detection' };
   const command = { command_id: '5', robot_id: 'rheo-1', kind: 'set_setpoint', submitted_at_us: at(200) };
-  const lease = { ...command, command_id: '6', kind: 'renew_lease' };
   const late = { ...command, command_id: '7', submitted_at_us: at(9000) };
   const moment = { key: 'e11-4', utc_us: at(600), kind: 'event' as const, text: '', by: '' };
   const lines = lines_of(
     [event as unknown as EventRecord],
-    [command, lease, late] as unknown as CommandRecord[],
+    [command, late] as unknown as CommandRecord[],
     [moment],
     kExtent,
   );

@@ -205,9 +205,9 @@ export function lines_of(
     const key = `event-${event.boot_id}-${event.event_seq}-${event.received_at_us}`;
     return line(key, event.robot_id, utc_us, { event });
   });
-  const of_commands = commands
-    .filter(({ kind }) => kind !== 'renew_lease')
-    .map((command) => line(`command-${command.command_id}`, command.robot_id, command.submitted_at_us, { command }));
+  const of_commands = commands.map((command) =>
+    line(`command-${command.command_id}`, command.robot_id, command.submitted_at_us, { command }),
+  );
   return [...of_events, ...of_commands].filter(({ at_ms }) => at_ms * 1000 >= first_us && at_ms * 1000 <= last_us);
 }
 
