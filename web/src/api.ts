@@ -148,8 +148,11 @@ export class Api {
     this.ask<Overview>('GET', past(robot_id, 'overview', { from_us, to_us, points, channels: kOverviewChannels }));
   robot_events = async (robot_id: string) =>
     (await this.ask<{ events: EventRecord[] }>('GET', past(robot_id, 'events', { limit: 1000 }))).events;
-  robot_commands = async (robot_id: string) =>
-    (await this.ask<{ commands: CommandRecord[] }>('GET', past(robot_id, 'commands', { limit: 1000 }))).commands;
+  // The newest 1000, but for renewals of leases: there are ten a second while a motor runs.
+  robot_commands = async (robot_id: string) => {
+    const path = past(robot_id, 'commands', { limit: 1000, renewals: 'false' });
+    return (await this.ask<{ commands: CommandRecord[] }>('GET', path)).commands;
+  };
   robot_markers = async (robot_id: string, after: number) =>
     (
       await this.ask<{ markers: MarkerRecord[] }>(

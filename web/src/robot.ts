@@ -142,7 +142,7 @@ export class Robot {
     return (this.made_ring ??= new SampleRing());
   }
 
-  // UTC less the times of its ring, by the station's estimate of the robot's clock; without one by this computer's clock.
+  // UTC less the times of its ring, by the station's estimate of the robot's clock; without one by when they came.
   utc_shift_s(utc_minus_steady_us: number | null, page_utc_s: number): number {
     const offset_us = this.state.peek().clock?.offset_us;
     if (offset_us === undefined || utc_minus_steady_us === null) return page_utc_s;

@@ -27,12 +27,14 @@ export class StationPath {
   private readonly sent = new Map<number, number>(); // stamp_us → when its echo left; the oldest first
   private latest_ms: number[] = [];
   private utc_offset_us: number | null = null; // UTC less the station's steady time
+  private utc_minus_page_ms: number | null = null; // as it was known last
 
   // A connection was welcomed: both ways have just worked.
   begin(welcome: { stamp_us: number; utc_us: number }, now_ms: number): void {
     this.end();
     this.stamp_at_ms = now_ms;
     this.utc_offset_us = welcome.utc_us - welcome.stamp_us;
+    this.utc_minus_page_ms = welcome.utc_us / 1000 - now_ms;
   }
 
   end(): void {
@@ -93,5 +95,11 @@ export class StationPath {
   station_utc_us(now_ms: number): number | null {
     const station_us = this.station_us(now_ms);
     return station_us === null || this.utc_offset_us === null ? null : station_us + this.utc_offset_us;
+  }
+  // The same while it is not connected, as it was known last; by this computer's clock alone before the first connection.
+  utc_s(now_ms: number): number {
+    const utc_us = this.station_utc_us(now_ms);
+    if (utc_us !== null) this.utc_minus_page_ms = utc_us / 1000 - now_ms;
+    return (now_ms + (this.utc_minus_page_ms ?? Date.now() - now_ms)) / 1000;
   }
 }

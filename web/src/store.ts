@@ -38,6 +38,7 @@ export class Store {
   readonly runs = signal<RunRecord[]>([]); // that are open, at most one for each robot
   readonly interrupted = signal<RunRecord[]>([]); // of each robot its newest run, if the station stopped in it
   readonly latches = new Latches();
+  readonly command_listeners = new Set<(command: CommandRecord) => void>(); // called with each record that comes
   readonly now_ms = signal(0); // page time, for ages
   readonly experiments = new ExperimentsStore();
   private readonly by_id = new Map<string, Robot>();
@@ -68,11 +69,11 @@ export class Store {
         this.take_event(message.event);
         break;
       case 'command':
-        this.write(line_of_command(message.command));
+        this.take_command(message.command);
         break;
       case 'log':
         message.events.forEach((event) => this.take_event(event));
-        message.commands.forEach((command) => this.write(line_of_command(command)));
+        message.commands.forEach((command) => this.take_command(command));
         break;
       case 'run':
         this.take_run(message.run);
@@ -211,6 +212,11 @@ export class Store {
   private take_event(event: EventRecord): void {
     if (event.kind === 'emergency') this.latches.note(event.emergency_id, event.received_at_us / 1000, true);
     this.write(this.line_of_event(event));
+  }
+
+  private take_command(command: CommandRecord): void {
+    for (const listen of this.command_listeners) listen(command);
+    this.write(line_of_command(command));
   }
 
   private line_of_event(event: EventRecord): LogLine {

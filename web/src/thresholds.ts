@@ -25,6 +25,7 @@ export interface Alert {
   channel: Channel;
   since_ms: number; // UTC
   worst: number; // that was seen since
+  worst_sd_m: number | null; // of the position at that moment
   limit: number; // that it went beyond
   is_beyond: boolean; // now
   is_acknowledged: boolean;
@@ -78,11 +79,12 @@ export class Alerts {
       if (value === null) return known ? [known] : [];
       const limit = limit_beyond(range, value);
       if (limit === null) return !known || known.is_acknowledged ? [] : [{ ...known, is_beyond: false }];
-      if (!known) return [{ channel, since_ms: now_ms, worst: value, limit, is_beyond: true, is_acknowledged: false }];
-      const worst = Math.abs(value - limit) > Math.abs(known.worst - limit) ? value : known.worst;
+      const now = { worst: value, worst_sd_m: values.position_sd_m };
+      if (!known) return [{ channel, since_ms: now_ms, ...now, limit, is_beyond: true, is_acknowledged: false }];
+      const { worst, worst_sd_m } = Math.abs(value - limit) > Math.abs(known.worst - limit) ? now : known;
       // It was back in between: that is another one, and has been acknowledged by nobody.
       const is_acknowledged = known.is_acknowledged && known.is_beyond;
-      return [{ ...known, worst, limit, is_beyond: true, is_acknowledged }];
+      return [{ ...known, worst, worst_sd_m, limit, is_beyond: true, is_acknowledged }];
     });
     if (!is_same(before, after)) this.alerts.value = after;
   }

@@ -25,6 +25,12 @@ test('a command is a POST of JSON with SI units', async () => {
   expect(JSON.parse(String(asked[0]?.options.body))).toEqual({ kind: 'set_mode', mode: 'auto', setpoint_m: 0.1 });
 });
 
+test('the commands of a robot are asked for without renewals, which would fill the list', async () => {
+  const { api, asked } = api_that_answers(200, { commands: [] });
+  await api.robot_commands('rheo-1');
+  expect(asked[0]?.path).toBe('/api/v1/robots/rheo-1/commands?limit=1000&renewals=false');
+});
+
 test('a known refusal is said in the words of the operator', async () => {
   const { api } = api_that_answers(409, { title: 'Conflict', status: 409, detail: 'latch 5', reason: 'latched' });
   const error = await failure(api.set_duty('rheo-1', 0.3));

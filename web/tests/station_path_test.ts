@@ -134,3 +134,18 @@ test('of a connection that has ended nothing is left', () => {
   expect(path.heard_until_ms).toBe(-Infinity);
   expect(path.station_us(200)).toBeNull();
 });
+
+describe("the station's time in UTC", () => {
+  test('is known from the welcome on, whatever the clock of this computer says, and after the connection is lost', () => {
+    const { path, stamp } = connected();
+    expect(path.utc_s(50)).toBeCloseTo(1_764_000_000.05, 3);
+    stamp(100);
+    expect(path.utc_s(1000)).toBeCloseTo(1_764_000_000.998, 3);
+    path.end();
+    expect(path.utc_s(2000)).toBeCloseTo(1_764_000_001.998, 3);
+  });
+
+  test('is that of this computer before the first connection', () => {
+    expect(Math.abs(new StationPath().utc_s(123) - Date.now() / 1000)).toBeLessThan(1);
+  });
+});

@@ -32,7 +32,15 @@ test('a value beyond a threshold is announced, with the worst that was seen; one
   expect(of()).toBeUndefined();
   for (const value of [0.21, 0.3, 0.25]) judge(value);
   expect(alerts.alerts.value).toEqual([
-    { channel: 'estimate_m', since_ms: 200, worst: 0.3, limit: 0.2, is_beyond: true, is_acknowledged: false },
+    {
+      channel: 'estimate_m',
+      since_ms: 200,
+      worst: 0.3,
+      worst_sd_m: 0.5,
+      limit: 0.2,
+      is_beyond: true,
+      is_acknowledged: false,
+    },
   ]);
 });
 
@@ -89,4 +97,31 @@ test('a threshold is typed in the unit that is shown; nothing is none, and what 
   expect(parse_threshold('\u22123', 1e-3)).toBe(-0.003);
   expect(parse_threshold('', 1)).toBeNull();
   for (const text of ['x', '1e3', '1 2', '-']) expect(parse_threshold(text, 1)).toBeUndefined();
+});
+
+test('the line says the "±" of a position, which way it went, and no old value as the present', async () => {
+  const { sentence } = await import('../src/parts/threshold_list');
+  const { judge, of } = judged();
+  judge(0.25);
+  expect(sentence(of()!, true)).toMatch(
+    /^Position, estimated above 200\.0 mm since \d\d:\d\d:\d\d, up to 250\.0 ± 1000\.0$/,
+  );
+  expect(sentence(of()!, false)).toMatch(
+    /^Position, estimated was above 200\.0 mm from \S+ until it was seen last, up/,
+  );
+  judge(0.1);
+  expect(sentence(of()!, false)).toMatch(/ above 200\.0 mm at \S+, up to 250\.0 ± 1000\.0; over now$/);
+  const low = judged();
+  low.judge(-0.3);
+  expect(sentence(low.of()!, true)).toMatch(/ below −100\.0 mm since \S+, down to −300\.0 ± 1000\.0$/);
+});
+
+test('the "±" is that of the worst moment', () => {
+  const alerts = new Alerts();
+  for (const [estimate_m, position_sd_m] of [
+    [0.3, 0.001],
+    [0.25, 0.02],
+  ] as const)
+    alerts.judge(kRanges, { ...values(estimate_m), position_sd_m }, 0);
+  expect(alerts.alerts.value[0]).toMatchObject({ worst: 0.3, worst_sd_m: 0.001 });
 });

@@ -1,39 +1,61 @@
 // The commands of a robot, newest first, each with the time that it took to every stage.
 
 import { useSignal } from '@preact/signals';
-import { useEffect } from 'preact/hooks';
+import { useEffect, useMemo } from 'preact/hooks';
 import type { CommandRecord } from '../api';
 import { clock_time, milliseconds_of_us, words } from '../format';
 import { sentence } from '../reasons';
 import type { Robot } from '../robot';
 import type { Session } from '../session';
-import type { LogLine } from '../store';
 import { arguments_text } from './log_strip';
+import { NewestCommands } from './newest_commands';
 
 export function CommandTable({ session, robot }: { session: Session; robot: Robot }) {
-  const loaded = useSignal<CommandRecord[] | null>(null);
-  const problem = useSignal('');
   const { robot_id } = robot;
-  const load = () => {
+  const known = useMemo(() => new NewestCommands(robot_id), [robot_id]);
+  const problem = useSignal('');
+  const tries = useSignal(0);
+  const phase = session.phase.value;
+  useEffect(() => {
+    const { command_listeners } = session.store;
+    command_listeners.add(known.report);
+    return () => void command_listeners.delete(known.report);
+  }, [known]);
+  // Again with each connection: what happened before it was reported to nobody here.
+  useEffect(() => {
+    if (phase !== 'live') return;
+    let is_over = false;
     problem.value = '';
+    known.ask();
     session.api.robot_commands(robot_id).then(
-      (commands) => (loaded.value = commands),
-      (error: Error) => (problem.value = error.message),
+      (commands) => is_over || known.take_answer(commands),
+      (error: Error) => is_over || (problem.value = error.message),
     );
-  };
-  useEffect(load, []);
-  if (problem.value) {
-    return (
-      <p class="failed" role="alert">
-        {problem.value}{' '}
-        <button type="button" onClick={load}>
-          Try again
-        </button>
-      </p>
-    );
-  }
-  if (loaded.value === null) return <p class="quiet">Loading the commands …</p>;
-  const commands = newest_of(loaded.value, session.store.log.value, robot_id);
+    return () => void (is_over = true);
+  }, [known, phase, tries.value]);
+  return (
+    <>
+      {problem.value && (
+        <p class="failed" role="alert">
+          {problem.value}{' '}
+          <button type="button" onClick={() => (tries.value += 1)}>
+            Try again
+          </button>
+        </p>
+      )}
+      <Commands robot_id={robot_id} commands={known.list.value} is_failed={problem.value !== ''} />
+    </>
+  );
+}
+
+interface CommandsProps {
+  robot_id: string;
+  commands: readonly CommandRecord[] | null;
+  is_failed: boolean;
+}
+
+function Commands({ robot_id, commands, is_failed }: CommandsProps) {
+  if (commands === null) return is_failed ? null : <p class="quiet">Loading the commands …</p>;
   if (commands.length === 0) return <p class="quiet">Nobody has commanded {robot_id} yet.</p>;
   return (
     <div class="command-table" tabIndex={0} role="region" aria-label={`Commands of ${robot_id}, newest first`}>
@@ -81,16 +103,4 @@ function Row({ command }: { command: CommandRecord }) {
       <td class="number">{milliseconds_of_us(command.verified_after_us)}</td>
     </tr>
   );
-}
-
-// What was loaded, and what /live has said since; of each command what was said last. Renewals of a lease are left out:
-// there are ten a second while a motor runs.
-export function newest_of(loaded: CommandRecord[], log: LogLine[], robot_id: string): CommandRecord[] {
-  const by_id = new Map<string, CommandRecord>();
-  const take = (command: CommandRecord) => {
-    if (command.kind !== 'renew_lease' && command.robot_id === robot_id) by_id.set(command.command_id, command);
-  };
-  loaded.forEach(take);
-  for (const { command } of [...log].reverse()) if (command) take(command);
-  return [...by_id.values()].sort((one, other) => other.submitted_at_us - one.submitted_at_us);
 }

@@ -18,6 +18,7 @@ type PageName = (typeof kPages)[number]['name'];
 export function LogPanel({ session, robot }: { session: Session; robot: Robot | null }) {
   const chosen = useSignal<PageName>('log');
   const shown = robot ? chosen.value : 'log';
+  const is_current = session.store.is_current.value;
   const tabs = robot && (
     <div class="log-tabs" role="tablist" aria-label="Log, commands, what is in force">
       {kPages.map(({ name, text }) => (
@@ -37,14 +38,14 @@ export function LogPanel({ session, robot }: { session: Session; robot: Robot | 
   );
   if (robot && shown === 'commands') {
     return (
-      <LogPage tabs={tabs} label={`Commands of ${robot.robot_id}`}>
+      <LogPage tabs={tabs} is_current={is_current} label={`Commands of ${robot.robot_id}`}>
         <CommandTable key={robot.robot_id} session={session} robot={robot} />
       </LogPage>
     );
   }
   if (robot && shown === 'in-force') {
     return (
-      <LogPage tabs={tabs} label={`In force on ${robot.robot_id}`}>
+      <LogPage tabs={tabs} is_current={is_current} label={`In force on ${robot.robot_id}`}>
         <InForce key={robot.robot_id} session={session} robot={robot} />
       </LogPage>
     );
@@ -56,11 +57,28 @@ export function LogPanel({ session, robot }: { session: Session; robot: Robot | 
   );
 }
 
-function LogPage({ tabs, label, children }: { tabs: ComponentChildren; label: string; children: ComponentChildren }) {
+interface LogPageProps {
+  tabs: ComponentChildren;
+  label: string;
+  is_current?: boolean; // of what shows states, not moments
+  children: ComponentChildren;
+}
+
+function LogPage({ tabs, label, is_current = true, children }: LogPageProps) {
   return (
     <section class="log-strip" aria-label={label}>
       {tabs || <h2>Log</h2>}
-      <div class="log-page" id="log-page" role={tabs ? 'tabpanel' : undefined} aria-label={label}>
+      <div
+        class={`log-page ${is_current ? '' : 'stale'}`}
+        id="log-page"
+        role={tabs ? 'tabpanel' : undefined}
+        aria-label={label}
+      >
+        {!is_current && (
+          <p class="quiet" role="status">
+            Cut off from the station: this was known last.
+          </p>
+        )}
         {children}
       </div>
     </section>

@@ -7,10 +7,10 @@ import type { LogLine } from '../store';
 
 export const LogStrip = ({ session }: { session: Session }) => <LogLines lines={session.store.log.value} />;
 
-export function LogLines({ lines }: { lines: readonly LogLine[] }) {
+export function LogLines({ lines, none = 'Nothing yet.' }: { lines: readonly LogLine[]; none?: string | undefined }) {
   return (
     <ol tabIndex={0} aria-label="Events and commands">
-      {lines.length === 0 && <li class="quiet">Nothing yet.</li>}
+      {lines.length === 0 && <li class="quiet">{none}</li>}
       {lines.map((line) => (
         <Line key={line.key} line={line} />
       ))}

@@ -5,7 +5,7 @@
 import { useEffect, useMemo } from 'preact/hooks';
 import { Past } from '../plots/past';
 import { PlotBar } from '../plots/plot_bar';
-import { PredictionLoader } from '../plots/prediction_loader';
+import { PredictionLoader, RunningZero } from '../plots/prediction_loader';
 import { Scene } from '../plots/scene';
 import { StripHost } from '../plots/strip_host';
 import { plot_settings } from '../plots/strips';
@@ -25,23 +25,24 @@ const kPredictAgain_ms = 5000;
 class LiveScene extends Scene {
   private timer = 0;
   private readonly predicted: PredictionLoader;
+  private readonly running_zero = new RunningZero();
 
   constructor(
     private readonly session: Session,
     private readonly robot: Robot,
   ) {
-    const { api, experiments } = session;
+    const { api, experiments, path } = session;
     const { robot_id, ring } = robot;
     ring.grow(kRingSamples);
     const shift_s = () => {
-      const page_utc_s = (Date.now() - performance.now()) / 1000;
-      return robot.utc_shift_s(session.store.utc_minus_steady_us, page_utc_s);
+      const now_ms = performance.now();
+      return robot.utc_shift_s(session.store.utc_minus_steady_us, path.utc_s(now_ms) - now_ms / 1000);
     };
     const past = new Past(
       {
         samples: (from_us, to_us) => api.robot_samples(robot_id, from_us, to_us, kSamplesOfTile),
         overview: (from_us, to_us, points) => api.robot_overview(robot_id, from_us, to_us, points),
-        now_s: () => Date.now() / 1000,
+        now_s: () => path.utc_s(performance.now()),
       },
       () => this.mark_dirty(),
     );
@@ -105,15 +106,9 @@ class LiveScene extends Scene {
     const at_work = this.session.store.experiments.at_work_on(this.robot.robot_id);
     const change = at_work ? `${at_work.experiment_id} ${at_work.state} ${JSON.stringify(at_work.run_counts)}` : '';
     const { run, elapsed_s } = at_work?.progress ?? { run: -1, elapsed_s: 0 };
-    await this.predicted.look(this.view, this.running_zero_s(run, elapsed_s), change);
-  }
-
-  // The report that was the least late says best when the run began.
-  private running = { run: -1, zero_s: Infinity };
-  private running_zero_s(run: number, elapsed_s: number): number | null {
-    if (run !== this.running.run) this.running = { run, zero_s: Infinity };
-    if (elapsed_s > 0) this.running.zero_s = Math.min(this.running.zero_s, Date.now() / 1000 - elapsed_s);
-    return Number.isFinite(this.running.zero_s) ? this.running.zero_s : null;
+    const utc_s = this.session.path.utc_s(performance.now());
+    const zero_s = this.running_zero.of(`${at_work?.experiment_id}/${run}`, elapsed_s, utc_s);
+    await this.predicted.look(this.view, zero_s, change);
   }
 
   override close(): void {

@@ -129,7 +129,7 @@ function Interrupted({ session, robot_id }: { session: Session; robot_id: string
   const run = session.store.interrupted.value.find((other) => other.robot_id === robot_id);
   if (!run || session.settings.dismissed.names.value.has(session.notice_of(run))) return null;
   return (
-    <div class="interrupted" id="interrupted-run" role="status">
+    <div class="interrupted-run" id="interrupted-run" role="status">
       <p>
         Run “{run.name}” was interrupted at {clock_time((run.ended_at_us ?? run.started_at_us) / 1000).slice(0, 8)}: the
         station stopped while it was open. {lost(run)}

@@ -2,7 +2,15 @@
 
 import { useSignal } from '@preact/signals';
 import { useEffect, useMemo } from 'preact/hooks';
-import { clock_time, milliseconds_of_us, millimetres, millimetres_per_s, millivolts, percent } from '../format';
+import {
+  clock_time,
+  milliseconds_of_us,
+  millimetres,
+  millimetres_per_s,
+  millivolts,
+  percent,
+  plus_minus,
+} from '../format';
 import { useCloseOnEscape } from '../keys';
 import type { Robot } from '../robot';
 import type { Session } from '../session';
@@ -63,14 +71,15 @@ export function AlertLine({ session, robot }: { session: Session; robot: Robot }
     alerts.judge(ranges, { ...now, round_trip_us }, Date.now());
     warning.follow(alerts.alerts.peek(), performance.now());
   }, [now, ranges]);
+  const is_known = !now.stale && session.store.is_current.value;
   const announced = alerts.alerts.value.filter((alert) => !alert.is_acknowledged);
   if (announced.length === 0) return null;
   return (
     <div class="alert-line" id="alert-line" role="alert">
       <ul>
         {announced.map((alert) => (
-          <li key={alert.channel} class={alert.is_beyond ? 'beyond' : 'over'}>
-            {sentence(alert)}
+          <li key={alert.channel} class={alert.is_beyond && is_known ? 'beyond' : 'over'}>
+            {sentence(alert, is_known)}
           </li>
         ))}
       </ul>
@@ -91,11 +100,18 @@ export function AlertLine({ session, robot }: { session: Session; robot: Robot }
   );
 }
 
-function sentence({ channel, worst, limit, since_ms, is_beyond }: Alert): string {
+// SAFETY: what is not known now is said of the time until it was seen last. `is_known`: samples come.
+export function sentence(alert: Alert, is_known: boolean): string {
+  const { channel, worst, worst_sd_m, limit, since_ms, is_beyond } = alert;
   const { title, unit, text } = kShown[channel];
-  const side = worst > limit ? 'above' : 'below';
-  const when = `${is_beyond ? 'since' : 'at'} ${clock_time(since_ms).slice(0, 8)}`;
-  return `${title} ${side} ${text(limit)} ${unit} ${when}, up to ${text(worst)}${is_beyond ? '' : '; over now'}`;
+  const is_above = worst > limit;
+  const at = clock_time(since_ms).slice(0, 8);
+  const is_past = is_beyond && !is_known;
+  const when = is_past ? `from ${at} until it was seen last` : `${is_beyond ? 'since' : 'at'} ${at}`;
+  const what = `${is_past ? 'was ' : ''}${is_above ? 'above' : 'below'} ${text(limit)} ${unit}`;
+  const spread = channel === 'estimate_m' ? ` ${plus_minus(worst_sd_m)}` : '';
+  const most = `${is_above ? 'up' : 'down'} to ${text(worst)}${spread}`;
+  return `${title} ${what} ${when}, ${most}${is_beyond ? '' : '; over now'}`;
 }
 
 export function ThresholdList({ session }: { session: Session }) {

@@ -35,8 +35,7 @@ export class Marks {
   }
 
   take_commands(commands: CommandRecord[]): void {
-    const shown = commands.filter(({ kind }) => kind !== 'renew_lease'); // several a second while a duty is held
-    this.put(shown.map((command) => mark_of(line_of({ command }), command.submitted_at_us)));
+    this.put(commands.map((command) => mark_of(line_of({ command }), command.submitted_at_us)));
   }
 
   // What has happened since; `lines` are of every robot, and of the page.

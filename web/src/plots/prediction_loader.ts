@@ -17,6 +17,19 @@ const kMostAtOnce = 24; // predictions in one stretch; of more the newest
 const kListAgain_ms = 60_000; // while nothing is known to have changed
 const kBefore_s = 30; // a run is recorded before its first step begins
 
+// When the run that goes on began, in UTC: of what is reported of it, the report that was the least late says best.
+export class RunningZero {
+  private key = '';
+  private zero_s = Infinity;
+
+  // `key`: of the experiment and its run. null: not known yet.
+  of(key: string, elapsed_s: number, utc_s: number): number | null {
+    if (key !== this.key) [this.key, this.zero_s] = [key, Infinity];
+    if (elapsed_s > 0) this.zero_s = Math.min(this.zero_s, utc_s - elapsed_s);
+    return Number.isFinite(this.zero_s) ? this.zero_s : null;
+  }
+}
+
 export class PredictionLoader {
   found: readonly Predicted[] = [];
   private readonly answers = new Map<string, Prediction>(); // by experiment and run; none of them changes

@@ -23,6 +23,7 @@ export class XyPoints {
   x_range: [number, number] = [Infinity, -Infinity];
   y_range: [number, number] = [Infinity, -Infinity];
   from_s = NaN; // of the first point
+  most_sd_m = 0; // the largest of the position; NaN: of some point it is not known
   is_cut = false; // there were more than kMostPoints
   private previous_s = -Infinity;
   private is_broken = true;
@@ -30,7 +31,7 @@ export class XyPoints {
   fill({ rows, shift_s, past }: XySource, { from_s, to_s }: Stretch, x_name: AnyColumn, y_name: AnyColumn): void {
     this.clear();
     const { gap_s, capacity, time_s } = rows;
-    const [x, y] = [rows.column(x_name), rows.column(y_name)];
+    const [x, y, sd_m] = [rows.column(x_name), rows.column(y_name), rows.column('position_sd_m')];
     const least_s = to_s - kMostPoints * rows.period_s;
     this.is_cut = least_s > from_s;
     const first_s = Math.max(from_s, least_s);
@@ -46,7 +47,7 @@ export class XyPoints {
       if (at_s < first_s || at_s <= this.previous_s) continue;
       if (at_s > to_s) break;
       look_up(known_to_s, at_s);
-      this.put(at_s, x[slot] as number, y[slot] as number, gap_s);
+      this.put(at_s, x[slot] as number, y[slot] as number, sd_m[slot] ?? NaN, gap_s);
       known_to_s = at_s;
     }
     look_up(known_to_s, to_s);
@@ -59,6 +60,7 @@ export class XyPoints {
     this.previous_s = -Infinity;
     this.is_broken = true;
     this.from_s = NaN;
+    this.most_sd_m = 0;
   }
 
   private put_point(
@@ -72,10 +74,11 @@ export class XyPoints {
   ): void {
     const time_s = tile.first_s[at] as number;
     if (tile.first_s !== tile.last_s || time_s < start_s || time_s >= end_s || time_s <= this.previous_s) return;
-    this.put(time_s, tile.columns[x_name]?.min[at] ?? NaN, tile.columns[y_name]?.min[at] ?? NaN, gap_s);
+    const of = (name: AnyColumn) => tile.columns[name]?.max[at] ?? NaN;
+    this.put(time_s, of(x_name), of(y_name), of('position_sd_m'), gap_s);
   }
 
-  private put(at_s: number, x: number, y: number, gap_s: number): void {
+  private put(at_s: number, x: number, y: number, sd_m: number, gap_s: number): void {
     if (at_s - this.previous_s > gap_s) this.is_broken = true;
     this.previous_s = at_s;
     if (!Number.isFinite(x) || !Number.isFinite(y)) return void (this.is_broken = true);
@@ -86,6 +89,7 @@ export class XyPoints {
     this.starts[this.size] = this.is_broken ? 1 : 0;
     this.is_broken = false;
     this.size += 1;
+    this.most_sd_m = Math.max(this.most_sd_m, sd_m);
     this.x_range = [Math.min(this.x_range[0], x), Math.max(this.x_range[1], x)];
     this.y_range = [Math.min(this.y_range[0], y), Math.max(this.y_range[1], y)];
   }

@@ -2,7 +2,7 @@
 
 import { useSignal } from '@preact/signals';
 import { useEffect, useRef } from 'preact/hooks';
-import { count } from '../format';
+import { count, plus_minus } from '../format';
 import { Choice } from '../parts/choice';
 import { next_range } from '../range';
 import type { Scene } from './scene';
@@ -66,7 +66,7 @@ function OpenXyPlot({ scene }: { scene: Scene }) {
           font: colour('--numerals'),
         },
       });
-      note.value = note_of(points);
+      note.value = note_of(points, [xy.x, xy.y]);
     };
     // With the strips, but not as often; the last change is drawn for certain.
     const follow = () => {
@@ -118,8 +118,12 @@ function OpenXyPlot({ scene }: { scene: Scene }) {
   );
 }
 
-function note_of({ size, is_cut }: XyPoints): string {
+// A position is an estimate: what is drawn of it, or computed from it, is not surer than that.
+export function note_of({ size, is_cut, most_sd_m }: XyPoints, columns: readonly string[]): string {
   if (size === 0) return 'No sample with both values in the time shown.';
-  if (is_cut) return `${count(size)} samples: the newest of the time shown, at most ${count(kMostPoints)}.`;
-  return `${count(size)} ${size === 1 ? 'sample' : 'samples'} of the time shown, the newest in the ring.`;
+  const is_estimate = columns.some((name) => /estimate_m|position_m/.test(name));
+  const sd_m = Number.isNaN(most_sd_m) ? null : most_sd_m;
+  const spread = is_estimate ? ` The position is ${plus_minus(sd_m)} mm (2 sd, the largest).` : '';
+  if (is_cut) return `${count(size)} samples: the newest of the time shown, at most ${count(kMostPoints)}.${spread}`;
+  return `${count(size)} ${size === 1 ? 'sample' : 'samples'} of the time shown, the newest in the ring.${spread}`;
 }

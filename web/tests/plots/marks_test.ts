@@ -4,10 +4,10 @@ import type { CommandRecord, EventRecord, RunRecord } from '../../src/api';
 import { Marks } from '../../src/plots/marks';
 import { chosen_strips, columns_of, PlotSettings } from '../../src/plots/strips';
 
-const command = (id: string, at_us: number, kind = 'set_setpoint', state = 'verified') =>
+const command = (id: string, at_us: number, state = 'verified') =>
   ({
     command_id: id,
-    kind,
+    kind: 'set_setpoint',
     state,
     submitted_at_us: at_us,
     arguments: {},
@@ -30,18 +30,12 @@ test('marks stand in the order of time, and one that is told again is one', () =
   const marks = new Marks();
   marks.take_commands([command('2', 9e6), command('1', 3e6)]);
   marks.take_events([event(1, 5e6)]);
-  marks.take_commands([command('2', 9e6, 'set_setpoint', 'failed')]);
+  marks.take_commands([command('2', 9e6, 'failed')]);
   expect(marks.all.map(({ at_s }) => at_s)).toEqual([3, 5, 9]);
   expect(marks.all.at(-1)?.tone).toBe('caution');
   expect(marks.within(4, 9).map(({ at_s }) => at_s)).toEqual([5]);
   expect(marks.near(5.4, 0.5)?.at_s).toBe(5);
   expect(marks.near(6, 0.5)).toBeNull();
-});
-
-test('renewed leases are no marks', () => {
-  const marks = new Marks();
-  marks.take_commands([command('1', 1e6, 'renew_lease')]);
-  expect(marks.all).toHaveLength(0);
 });
 
 test('the log of another robot is not ours, and what is known from the station is not doubled', () => {

@@ -2,7 +2,7 @@
 import { expect, test } from 'vitest';
 import type { Experiment } from '../../src/experiments_api';
 import type { ExperimentSummary } from '../../src/experiments_store';
-import { PredictionLoader } from '../../src/plots/prediction_loader';
+import { PredictionLoader, RunningZero } from '../../src/plots/prediction_loader';
 import { predicted_at, PredictedBackdrop, type Predicted } from '../../src/plots/predictions';
 
 const kT0_s = 1_000_000_000;
@@ -118,4 +118,13 @@ test('a run without a prediction has none', async () => {
   const { loader } = ways_of([summary({})], { has_prediction: false });
   await loader.look(kShown, null);
   expect(loader.found).toEqual([]);
+});
+
+test('the first run of another experiment begins when that one says, and the report that was the least late counts', () => {
+  const zero = new RunningZero();
+  expect(zero.of('1/1', 0, kT0_s)).toBeNull();
+  expect(zero.of('1/1', 5, kT0_s + 5.4)).toBeCloseTo(kT0_s + 0.4, 6);
+  expect(zero.of('1/1', 6, kT0_s + 6.1)).toBeCloseTo(kT0_s + 0.1, 6);
+  expect(zero.of('1/1', 7, kT0_s + 7.9)).toBeCloseTo(kT0_s + 0.1, 6);
+  expect(zero.of('2/1', 1, kT0_s + 901)).toBe(kT0_s + 900);
 });

@@ -2,6 +2,7 @@
 import { expect, test } from 'vitest';
 import type { Tile } from '../../src/plots/past';
 import { kMostPoints, XyPoints, type XySource } from '../../src/plots/xy';
+import { note_of } from '../../src/plots/xy_plot';
 import { SampleRing } from '../../src/samples';
 import { batch } from '../fakes';
 
@@ -54,4 +55,16 @@ test('of too many samples the newest are drawn, and it says so', () => {
   expect(points.is_cut).toBe(true);
   expect(points.size).toBe(10);
   expect(filled(ring, 0, 1).is_cut).toBe(false);
+});
+
+test('a position is drawn with how sure it is at worst, and other channels are not', () => {
+  const ring = new SampleRing(8192);
+  ring.append(batch(0, 100), 0.99);
+  ring.append(batch(100, 100, { position_sd_m: 0.003 }), 1.99);
+  const said = (to_s: number, columns: string[]) => note_of(filled(ring, 0, to_s), columns);
+  expect(said(0.5, ['duty', 'estimate_m'])).toMatch(/The position is ± 2\.0 mm \(2 sd, the largest\)\.$/);
+  expect(said(2, ['=low-pass position_m (0.5 s)', 'duty'])).toContain('± 6.0 mm');
+  expect(said(2, ['position_sd_m', 'duty'])).not.toContain('±');
+  ring.append(batch(200, 10, { position_sd_m: null }), 2.09);
+  expect(said(3, ['duty', 'estimate_m'])).toContain('± – mm');
 });

@@ -1,7 +1,7 @@
 // A run that is replayed: what it shows at a moment, steps, jumps, what has happened so far; and that none of it acts.
 import { expect, test } from 'vitest';
 import type { CommandRecord, EventRecord, StoredSample } from '../../src/api';
-import { lines_of, marks_of, Replay, type Mark } from '../../src/views/runs/replay/replay';
+import { line_at, lines_of, marks_of, Replay, type Mark } from '../../src/views/runs/replay/replay';
 import { act_of, is_taken } from '../../src/views/runs/replay/replay_keys';
 import { outline_of, thinned } from '../../src/views/runs/replay/scrub_bar';
 import { why_missing } from '../../src/views/runs/replay/losses';
@@ -111,12 +111,11 @@ test('it lists what had happened until then, the newest first, and nothing of la
   const replay = await replay_of(samples(0, 2500));
   const event = { robot_id: 'rheo-1', boot_id: '11', event_seq: 4, received_at_us: at(900), kind: 'detection' };
   const command = { command_id: '5', robot_id: 'rheo-1', kind: 'set_setpoint', submitted_at_us: at(200) };
-  const lease = { ...command, command_id: '6', kind: 'renew_lease' };
   const late = { ...command, command_id: '7', submitted_at_us: at(9000) };
   const moment = { key: 'e11-4', utc_us: at(600), kind: 'event' as const, text: '', by: '' };
   const lines = lines_of(
     [event as unknown as EventRecord],
-    [command, lease, late] as unknown as CommandRecord[],
+    [command, late] as unknown as CommandRecord[],
     [moment],
     kExtent,
   );
@@ -128,6 +127,47 @@ test('it lists what had happened until then, the newest first, and nothing of la
   expect(replay.lines.value.map(({ key }) => key)).toEqual([`event-11-4-${at(900)}`, 'command-5']);
   replay.seek(5);
   expect(replay.lines.value.map(({ key }) => key)).toEqual(['command-5']);
+});
+
+test('of a command it shows what had become of it by then', async () => {
+  const replay = await replay_of(samples(0, 2500));
+  const made = {
+    command_id: '5',
+    robot_id: 'rheo-1',
+    kind: 'set_setpoint',
+    state: 'verified',
+    reason: '',
+    submitted_at_us: at(200),
+    sent_after_us: 50_000,
+    acknowledged_after_us: 100_000,
+    verified_after_us: 2_000_000,
+    ended_at_us: at(400),
+  };
+  const [line] = lines_of([], [made as unknown as CommandRecord], [], kExtent);
+  replay.take_lines([line!]);
+  const shown = (at_s: number) => {
+    replay.seek(at_s);
+    return replay.lines.value[0]?.command;
+  };
+  expect([2, 2.06, 2.2, 4.5, 2.2].map((at_s) => shown(at_s)?.state)).toEqual([
+    'queued',
+    'sent',
+    'acknowledged',
+    'verified',
+    'acknowledged',
+  ]);
+  expect(shown(2.2)).toMatchObject({ sent_after_us: 50_000, acknowledged_after_us: 100_000, verified_after_us: null });
+
+  const refused = {
+    ...made,
+    state: 'rejected',
+    reason: 'latched',
+    acknowledged_after_us: null,
+    verified_after_us: null,
+  };
+  const [of_refused] = lines_of([], [{ ...refused, ended_at_us: at(300) } as unknown as CommandRecord], [], kExtent);
+  expect(line_at(of_refused!, at(250)).command).toMatchObject({ state: 'sent', reason: '' });
+  expect(line_at(of_refused!, at(300)).command).toMatchObject({ state: 'rejected', reason: 'latched' });
 });
 
 test('marks are moments of the run and beginnings of gaps', () => {
@@ -172,6 +212,12 @@ test('a field keeps its keys, and a button its Space', () => {
   expect(is_taken(within('button'), 'ArrowLeft')).toBe(false);
   expect(is_taken(within('div'), ' ')).toBe(false);
   expect(is_taken(null, ' ')).toBe(false);
+});
+
+test('a list that has the focus keeps the keys that scroll it', () => {
+  const log = { closest: (list: string) => (list.split(', ').includes('ol') ? {} : null) } as unknown as Element;
+  for (const key of ['PageUp', 'PageDown', 'Home', 'End', ' ']) expect(is_taken(log, key)).toBe(true);
+  expect(is_taken(log, 'ArrowLeft')).toBe(false);
 });
 
 test('the plots offer spans that are shorter than the run, and the whole of it', () => {

@@ -11,10 +11,11 @@ import type { Session } from '../../session';
 import { useActs, useAsked } from './acts';
 import { ActsOfOne, Presence } from './acts_of_one';
 import { KnowledgePanel } from './knowledge';
+import { measured_of, type Measured } from './measured';
 import type { Track } from './preview';
 import { RunsTable } from './runs_table';
 import { moment_text } from './slot_time';
-import { TrackPlot, type Measured } from './track_plot';
+import { TrackPlot } from './track_plot';
 import { how_long, kStates, progress_text, sentence_of, situation, who } from './words';
 
 export function OneExperiment({ session, id }: { session: Session; id: number }) {
@@ -206,7 +207,7 @@ function RunPlot({ session, experiment, summary }: RunPlotProps) {
         label={`Run ${number}: predicted from ${millimetres(answer.position_min_m ?? null, 0)} to ${millimetres(answer.position_max_m ?? null, 0)} mm`}
       />
       <p class="track-legend">
-        {measured && <span class="track-key measured">position, estimated</span>}{' '}
+        {measured && <span class="track-key measured">position, estimated ± 2 sd</span>}{' '}
         <span class="track-key predicted">predicted{has_band ? ' ± 2 sd' : ''}</span>{' '}
         <span class="track-key setpoint">setpoint</span> <span class="track-key duty">duty, predicted</span>
         <span class="quiet">
@@ -232,19 +233,9 @@ function track_of_prediction(prediction: Prediction | null): Track | null {
 
 // Where the robot believed that it was since the run began, as far as this page has received it.
 function useMeasured(robot: Robot | undefined, elapsed_s: number | null): Measured | null {
-  return useMemo(() => {
-    if (!robot || elapsed_s === null) return null;
-    const { ring } = robot;
-    const began_s = performance.now() / 1000 - elapsed_s;
-    const t_s: number[] = [];
-    const position_m: number[] = [];
-    for (let index = ring.first_index; index < ring.next_index; ++index) {
-      const slot = index % ring.capacity;
-      const since_s = (ring.time_s[slot] ?? NaN) - began_s;
-      if (!ring.holds(index) || !(since_s >= 0 && since_s <= elapsed_s)) continue;
-      t_s.push(since_s);
-      position_m.push(ring.columns.estimate_m[slot] ?? NaN);
-    }
-    return { t_s, position_m };
-  }, [robot, elapsed_s]);
+  return useMemo(
+    () =>
+      !robot || elapsed_s === null ? null : measured_of(robot.ring, performance.now() / 1000 - elapsed_s, elapsed_s),
+    [robot, elapsed_s],
+  );
 }

@@ -4,12 +4,8 @@ import { useEffect, useRef } from 'preact/hooks';
 import uPlot from 'uplot';
 import { next_range, range_splits } from '../../range';
 import { kSpread_sd, millimetres, percent } from '../../format';
+import { beside, type Measured } from './measured';
 import type { Track } from './preview';
-
-export interface Measured {
-  t_s: number[];
-  position_m: (number | null)[];
-}
 
 interface TrackPlotProps {
   track: Track;
@@ -81,7 +77,7 @@ function position_plot(host: HTMLElement, track: Track, measured: Measured | nul
       return at_m === null || sd === null ? null : at_m + sign * kSpread_sd * sd;
     });
   const columns: Columns = [edge(-1), edge(1), track.setpoint_m, track.position_m];
-  if (measured) columns.push(resampled(measured, track.t_s));
+  if (measured) columns.push(...beside(measured, track.t_s));
   const shown = columns.flat().filter((value): value is number => value !== null);
   const range = next_range([0, 0], Math.min(0, ...minmax(shown)), Math.max(0, ...minmax(shown)), 0.02);
   const edges: uPlot.Series[] = [{ width: 0 }, { width: 0 }];
@@ -94,12 +90,15 @@ function position_plot(host: HTMLElement, track: Track, measured: Measured | nul
     (value) => millimetres(value, 0),
     drawn,
     (colour) => ({
-      bands: [{ series: [2, 1], fill: colour('--spread') }],
+      bands: [
+        { series: [2, 1], fill: colour('--predicted-spread') },
+        ...(measured ? [{ series: [6, 5] as [number, number], fill: colour('--spread') }] : []),
+      ],
       series: [
         ...edges,
         { stroke: colour('--commanded'), width: 1.5 },
-        { stroke: colour('--seen'), width: 1.5, dash: [6, 3] },
-        ...(measured ? [{ stroke: colour('--measured'), width: 1.75 }] : []),
+        { stroke: colour('--predicted'), width: 1.5, dash: [6, 3] },
+        ...(measured ? [...edges, { stroke: colour('--measured'), width: 1.75 }] : []),
       ],
     }),
   );
@@ -127,16 +126,6 @@ const minmax = (values: number[]) =>
         ([low, high], value) => [Math.min(low, value), Math.max(high, value)],
         [Infinity, -Infinity],
       );
-
-// At the times of the prediction: the nearest one within two of its steps.
-function resampled({ t_s, position_m }: Measured, at_s: number[]): (number | null)[] {
-  const reach_s = 2 * ((at_s[1] ?? 1) - (at_s[0] ?? 0));
-  let next = 0;
-  return at_s.map((time_s) => {
-    while (next + 1 < t_s.length && Math.abs(t_s[next + 1]! - time_s) <= Math.abs(t_s[next]! - time_s)) next += 1;
-    return Math.abs((t_s[next] ?? Infinity) - time_s) <= reach_s ? (position_m[next] ?? null) : null;
-  });
-}
 
 function plot_of(
   host: HTMLElement,

@@ -15,6 +15,7 @@ export class RunPage {
   readonly metrics_problem = signal('');
   readonly markers = signal<Marker[]>([]);
   readonly events = signal<EventRecord[]>([]);
+  readonly unread = signal(''); // why it is not known what happened in it
   readonly whole = signal<Overview | null>(null);
   readonly traces = signal<Traces | null>(null); // of the window that is looked at
   readonly samples_in_point = signal(0); // the most
@@ -66,12 +67,13 @@ export class RunPage {
       this.problem.value = said(error);
       return;
     }
-    const { robot_id } = this.run.value;
     // Each stands alone: a run without metrics still has its plots.
     await Promise.all([
-      take(this.api.certificate(this.run_id), (certificate) => (this.certificate.value = certificate)),
-      take(this.api.markers(this.run_id), (markers) => (this.markers.value = markers)),
-      take(this.api.events(robot_id), (events) => (this.events.value = events)),
+      this.api.certificate(this.run_id).then(
+        (certificate) => (this.certificate.value = certificate),
+        () => undefined, // the page says nothing of losses then
+      ),
+      this.load_what_happened(),
       this.load_metrics(),
       this.load_whole(),
     ]);
@@ -84,6 +86,16 @@ export class RunPage {
     this.points = points;
     if (!this.whole.peek()) return; // load() looks when it is there
     await this.load_window();
+  }
+
+  async load_what_happened(): Promise<void> {
+    const { robot_id } = this.run.peek() as Run;
+    const asked = await Promise.allSettled([
+      this.api.markers(this.run_id).then((markers) => (this.markers.value = markers)),
+      this.api.events(robot_id).then((events) => (this.events.value = events)),
+    ]);
+    const failed = asked.find((each) => each.status === 'rejected');
+    this.unread.value = failed ? said(failed.reason) : '';
   }
 
   losses = () => this.api.losses(this.run_id);
@@ -179,5 +191,3 @@ export class RunPage {
 }
 
 export const said = (error: unknown) => (error instanceof Error ? error.message : String(error));
-
-const take = <T>(asked: Promise<T>, into: (value: T) => void) => asked.then(into, () => undefined);

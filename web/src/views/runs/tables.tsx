@@ -121,7 +121,12 @@ export function Moments({ page, is_clock, on_show }: MomentsProps) {
   return (
     <section aria-label="Markers, commands and events" id="moments">
       <h2>Markers, commands and events</h2>
-      {moments.length === 0 && <p class="quiet">None.</p>}
+      {page.unread.value && (
+        <p class="failed" role="alert">
+          Not all of them could be read: {page.unread.value} It is tried again every 5 s.
+        </p>
+      )}
+      {moments.length === 0 && !page.unread.value && <p class="quiet">None.</p>}
       <ol class="moments">
         {moments.map((moment) => (
           <li key={moment.key} class={moment.kind}>

@@ -176,10 +176,42 @@ export class Replay {
     const now_ms = this.at_us.peek() / 1000;
     let end = this.all_lines.length;
     while (end > 0 && (this.all_lines[end - 1] as LogLine).at_ms > now_ms) --end;
-    const shown = this.all_lines.slice(Math.max(0, end - kShownLines), end).reverse();
+    const shown = this.all_lines
+      .slice(Math.max(0, end - kShownLines), end)
+      .reverse()
+      .map((line) => line_at(line, this.at_us.peek()));
     const before = this.lines.peek();
-    if (shown.length !== before.length || shown[0] !== before[0]) this.lines.value = shown;
+    if (shown.length !== before.length || !shown.every((line, at) => is_same(line, before[at])))
+      this.lines.value = shown;
   }
+}
+
+const is_same = (a: LogLine, b: LogLine | undefined) =>
+  a.key === b?.key && a.at_ms === b.at_ms && a.command?.state === b.command?.state;
+
+// A command as it stood at a moment: what became of it later is not known then.
+export function line_at(line: LogLine, utc_us: number): LogLine {
+  const { command } = line;
+  if (!command) return line;
+  const { submitted_at_us, ended_at_us, sent_after_us, acknowledged_after_us, verified_after_us } = command;
+  const is_later = (after_us: number | null) => after_us !== null && submitted_at_us + after_us > utc_us;
+  const stages = { sent_after_us, acknowledged_after_us, verified_after_us };
+  if (!Object.values(stages).some(is_later) && (ended_at_us ?? 0) <= utc_us) return line;
+  const reached = (after_us: number | null) => (is_later(after_us) ? null : after_us);
+  const then = {
+    sent_after_us: reached(sent_after_us),
+    acknowledged_after_us: reached(acknowledged_after_us),
+    verified_after_us: reached(verified_after_us),
+  };
+  const state =
+    then.verified_after_us !== null
+      ? 'verified'
+      : then.acknowledged_after_us !== null
+        ? 'acknowledged'
+        : then.sent_after_us !== null
+          ? 'sent'
+          : 'queued';
+  return { ...line, command: { ...command, ...then, state, reason: '' } };
 }
 
 // Events at their time on the robot's clock where it is known, commands when they were submitted.
@@ -205,9 +237,9 @@ export function lines_of(
     const key = `event-${event.boot_id}-${event.event_seq}-${event.received_at_us}`;
     return line(key, event.robot_id, utc_us, { event });
   });
-  const of_commands = commands
-    .filter(({ kind }) => kind !== 'renew_lease')
-    .map((command) => line(`command-${command.command_id}`, command.robot_id, command.submitted_at_us, { command }));
+  const of_commands = commands.map((command) =>
+    line(`command-${command.command_id}`, command.robot_id, command.submitted_at_us, { command }),
+  );
   return [...of_events, ...of_commands].filter(({ at_ms }) => at_ms * 1000 >= first_us && at_ms * 1000 <= last_us);
 }
 

@@ -39,9 +39,12 @@ export function act_of(pressed: Pressed): Act | null {
 
 const kTakesKeys = 'input, textarea, select, [contenteditable], [role=combobox], [role=listbox]';
 const kTakesSpace = 'button, a, summary, label';
+const kScrolls = 'ol, pre, [role=region]'; // where it has the focus
+const kScrollKeys = ['PageUp', 'PageDown', 'Home', 'End', ' '];
 
-// Whether what has the focus keeps the key for itself: a field its keys, a button Space.
+// Whether what has the focus keeps the key for itself: a field its keys, a list those that scroll it, a button Space.
 export function is_taken(target: Partial<Element> | null, key: string): boolean {
-  if (target?.closest?.(kTakesKeys)) return true;
-  return key === ' ' && target?.closest?.(kTakesSpace) !== null && target?.closest?.(kTakesSpace) !== undefined;
+  const is_within = (list: string) => Boolean(target?.closest?.(list));
+  if (is_within(kTakesKeys)) return true;
+  return (kScrollKeys.includes(key) && is_within(kScrolls)) || (key === ' ' && is_within(kTakesSpace));
 }

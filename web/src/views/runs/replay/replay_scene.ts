@@ -20,14 +20,14 @@ export class ReplayScene extends Scene {
     robot_id: string,
     settings: PlotSettings,
   ) {
-    const { api, experiments } = session;
+    const { api, experiments, path } = session;
     const { player, reel } = replay;
     // Where the reel has no page the least and the largest values stand in, until it has.
     const past = new Past(
       {
         samples: () => Promise.resolve([]),
         overview: (from_us, to_us, points) => api.robot_overview(robot_id, from_us, to_us, points),
-        now_s: () => Date.now() / 1000,
+        now_s: () => path.utc_s(performance.now()),
       },
       () => this.mark_dirty(),
       1,

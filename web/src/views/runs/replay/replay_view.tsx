@@ -25,7 +25,7 @@ import { lines_of, marks_of, Replay, type Extent } from './replay';
 import { act_of, is_taken, type Act } from './replay_keys';
 import { ReplayScene, spans_of } from './replay_scene';
 import { Transport } from './transport';
-import { useCommands, useLosses } from './use_what_is_listed';
+import { unread_text, useCommands, useLosses, useRead } from './use_what_is_listed';
 
 const kAddress_ms = 1000; // between two changes of the address while it plays
 
@@ -109,8 +109,9 @@ function OneReplay({ session, page, route, run, extent }: Props & { run: Run; ex
   const asked = useAddress(replay, route);
   useClock(replay);
   useKeys(replay);
-  const { gaps_s, out_of_reach } = useWhatHappened(session, page, run, replay, scene, extent);
+  const { gaps_s, out_of_reach, problems } = useWhatHappened(session, page, run, replay, scene, extent);
   const losses = useLosses(session, page);
+  const unread = unread_text({ ...problems, 'lost samples': losses.problem });
   const now = replay.readout.value;
   const situation = replay.situation.value;
   const whole = page.whole.value;
@@ -126,7 +127,8 @@ function OneReplay({ session, page, route, run, extent }: Props & { run: Run; ex
             whole={whole}
             gaps_s={gaps_s}
             note={asked}
-            losses={losses}
+            losses={losses.answer}
+            unread={unread}
             out_of_reach={out_of_reach}
           />
         )
@@ -159,7 +161,10 @@ function OneReplay({ session, page, route, run, extent }: Props & { run: Run; ex
         </div>
         <section class="replay-log log-strip" aria-label="What had happened until then">
           <h2>As it happened</h2>
-          <LogLines lines={replay.lines.value} />
+          <LogLines
+            lines={replay.lines.value}
+            none={problems.commands || problems['events and markers'] ? 'Not known: it could not be read.' : undefined}
+          />
         </section>
       </div>
     </Frame>
@@ -273,7 +278,7 @@ function useWhatHappened(
   scene: ReplayScene,
   extent: Extent,
 ) {
-  const { commands, out_of_reach: commands_out } = useCommands(session, run);
+  const { commands, out_of_reach: commands_out, problem } = useCommands(session, run);
   const moments = page.moments.value;
   const events = page.events.value;
   // Of the whole run, however far the plots of its page have been zoomed.
@@ -287,13 +292,11 @@ function useWhatHappened(
     scene.marks.set_runs([run]);
     scene.mark_dirty();
   }, [replay, moments, events, commands, gaps_s]);
-  const is_live = session.phase.value === 'live';
-  useEffect(() => {
-    if (is_live) void scene.load_predictions(extent.first_us, extent.last_us).catch(() => undefined);
-  }, [scene, is_live]);
+  const predictions = useRead(session, () => scene.load_predictions(extent.first_us, extent.last_us), [scene]);
+  const problems = { 'events and markers': page.unread.value, commands: problem, predictions: predictions.problem };
   const oldest_us = events.length === 1000 ? Math.min(...events.map((event) => event.received_at_us)) : 0;
   const events_out = oldest_us > extent.first_us;
   const what = [events_out && 'events', commands_out && 'commands'].filter(Boolean).join(' and ');
   const out_of_reach = what ? `The station lists the newest 1000 ${what} of a robot: some of this run are older.` : '';
-  return { gaps_s, out_of_reach };
+  return { gaps_s, out_of_reach, problems };
 }

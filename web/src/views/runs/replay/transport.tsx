@@ -20,10 +20,11 @@ interface Props {
   gaps_s: [number, number][];
   note: string; // of the address
   losses: Losses | null;
+  unread: string; // what happened, and could not be read
   out_of_reach: string; // events that the station does not list any more
 }
 
-export function Transport({ replay, whole, gaps_s, note, losses, out_of_reach }: Props) {
+export function Transport({ replay, whole, gaps_s, note, losses, unread, out_of_reach }: Props) {
   const { player } = replay;
   const is_playing = player.is_playing.value;
   const at_s = player.at_s.value;
@@ -72,16 +73,17 @@ export function Transport({ replay, whole, gaps_s, note, losses, out_of_reach }:
       </div>
       <ScrubBar replay={replay} whole={whole} gaps_s={gaps_s} />
       <p class="transport-note" id="replay-note" role="status">
-        {note_of(replay, losses) || note || out_of_reach}
+        {note_of(replay, losses, unread) || note || out_of_reach}
       </p>
     </div>
   );
 }
 
 // What is to be known of the moment, the most important first.
-function note_of(replay: Replay, losses: Losses | null): string {
+function note_of(replay: Replay, losses: Losses | null, unread: string): string {
   const problem = replay.pages.problem.value;
   if (problem) return `Samples do not come: ${problem} It is tried again each second.`;
+  if (unread) return unread;
   if (replay.player.is_waiting.value) return 'Waiting for samples: the station does not send them as fast as this.';
   if (replay.is_unknown.value) return 'The samples of this moment are on their way.';
   const missing = replay.missing.value;

@@ -4,41 +4,63 @@ import { useSignal } from '@preact/signals';
 import { useEffect } from 'preact/hooks';
 import type { CommandRecord } from '../../../api';
 import type { Session } from '../../../session';
-import type { RunPage } from '../run_page';
+import { said, type RunPage } from '../run_page';
 import type { Losses, Run } from '../runs_api';
 
 const kListed = 1000; // the newest
+const kAgain_ms = 5000; // after a request that failed
 
-export function useCommands(session: Session, run: Run): { commands: readonly CommandRecord[]; out_of_reach: boolean } {
-  const commands = useSignal<readonly CommandRecord[]>([]);
+// Asked for until it has come; anew when one of `of` changes. `problem`: why it has not.
+export function useRead<Answer>(
+  session: Pick<Session, 'phase'>,
+  ask: () => Promise<Answer>,
+  of: readonly unknown[],
+): { answer: Answer | null; problem: string } {
+  const answer = useSignal<Answer | null>(null);
+  const problem = useSignal('');
   const is_live = session.phase.value === 'live';
   useEffect(() => {
+    if (!is_live) return;
     let is_wanted = true;
-    if (is_live)
-      void session.api.robot_commands(run.robot_id).then(
-        (found) => is_wanted && (commands.value = found),
-        () => undefined,
+    let timer: ReturnType<typeof setTimeout> | undefined;
+    const look = () =>
+      ask().then(
+        (found) => {
+          if (!is_wanted) return;
+          answer.value = found;
+          problem.value = '';
+        },
+        (error: unknown) => {
+          if (!is_wanted) return;
+          problem.value = said(error);
+          timer = setTimeout(() => void look(), kAgain_ms);
+        },
       );
-    return () => void (is_wanted = false);
-  }, [session, run.run_id, run.state, is_live]);
-  const oldest_us = commands.value.at(-1)?.submitted_at_us ?? 0;
-  return {
-    commands: commands.value,
-    out_of_reach: commands.value.length >= kListed && oldest_us > run.started_at_us,
-  };
+    void look();
+    return () => {
+      is_wanted = false;
+      clearTimeout(timer);
+    };
+  }, [session, ...of, is_live]);
+  return { answer: answer.value, problem: problem.value };
 }
 
-export function useLosses(session: Session, page: RunPage): Losses | null {
-  const losses = useSignal<Losses | null>(null);
-  const is_live = session.phase.value === 'live';
-  useEffect(() => {
-    let is_wanted = true;
-    if (is_live)
-      void page.losses().then(
-        (found) => is_wanted && (losses.value = found),
-        () => undefined,
-      );
-    return () => void (is_wanted = false);
-  }, [session, page, page.run.value?.state, is_live]);
-  return losses.value;
+const kNone: readonly CommandRecord[] = [];
+
+export function useCommands(session: Session, run: Run) {
+  const { answer, problem } = useRead(session, () => session.api.robot_commands(run.robot_id), [run.run_id, run.state]);
+  const commands: readonly CommandRecord[] = answer ?? kNone;
+  const oldest_us = commands.at(-1)?.submitted_at_us ?? 0;
+  return { commands, problem, out_of_reach: commands.length >= kListed && oldest_us > run.started_at_us };
+}
+
+export function useLosses(session: Session, page: RunPage): { answer: Losses | null; problem: string } {
+  return useRead(session, page.losses, [page, page.run.value?.state]);
+}
+
+// What could not be read of a run, in one line; '': all of it was.
+export function unread_text(problems: Record<string, string>): string {
+  const failed = Object.entries(problems).filter(([, problem]) => problem !== '');
+  const names = failed.map(([name]) => name).join(', ');
+  return failed.length === 0 ? '' : `Could not be read: ${names}. ${failed[0]?.[1]} It is tried again every 5 s.`;
 }

@@ -1,0 +1,39 @@
+// What the robot has believed of its position since a run began, with its "±", at the times of the run's prediction.
+
+import type { SampleRing } from '../../samples';
+
+export interface Measured {
+  t_s: number[];
+  position_m: number[]; // of an estimate
+  low_m: number[]; // two standard deviations below and above it; NaN: not known
+  high_m: number[];
+}
+
+// As far as the page has received it. Times of the ring are page time.
+export function measured_of(ring: SampleRing, began_s: number, elapsed_s: number): Measured {
+  const found: Measured = { t_s: [], position_m: [], low_m: [], high_m: [] };
+  const { estimate_m, estimate_low_m, estimate_high_m } = ring.columns;
+  for (let index = ring.first_index; index < ring.next_index; ++index) {
+    const slot = index % ring.capacity;
+    const since_s = (ring.time_s[slot] ?? NaN) - began_s;
+    if (!ring.holds(index) || !(since_s >= 0 && since_s <= elapsed_s)) continue;
+    found.t_s.push(since_s);
+    found.position_m.push(estimate_m[slot] ?? NaN);
+    found.low_m.push(estimate_low_m[slot] ?? NaN);
+    found.high_m.push(estimate_high_m[slot] ?? NaN);
+  }
+  return found;
+}
+
+// Lower edge, upper edge and estimate at the times of a prediction: of the nearest sample within two of its steps.
+export function beside(measured: Measured, at_s: readonly number[]): (number | null)[][] {
+  const { t_s, position_m, low_m, high_m } = measured;
+  const reach_s = 2 * ((at_s[1] ?? 1) - (at_s[0] ?? 0));
+  let next = 0;
+  const nearest = at_s.map((time_s) => {
+    while (next + 1 < t_s.length && Math.abs(t_s[next + 1]! - time_s) <= Math.abs(t_s[next]! - time_s)) next += 1;
+    return Math.abs((t_s[next] ?? Infinity) - time_s) <= reach_s ? next : -1;
+  });
+  const known = (value: number | undefined) => (value === undefined || Number.isNaN(value) ? null : value);
+  return [low_m, high_m, position_m].map((values) => nearest.map((at) => known(values[at])));
+}
