@@ -52,7 +52,7 @@ const steps = {
     const { position_sd_m } = await robot();
     assert.ok(position_sd_m > 0);
     const spread = /± \d+\.\d/;
-    assert.match(await text('#numeral-position .foot'), /± \d+\.\d mm \(2 sd\), model assumed/);
+    assert.match(await text('#numeral-position .foot'), /± \d+\.\d mm \(2 sd\), off by .*\smodel assumed/);
     assert.match(await text('#numeral-seen .foot'), spread);
     assert.match(await text('.robot-entry .figure'), /^1[45]\d\.\d ± \d+\.\d mm$/);
     await until('what it shows is two standard deviations', async () => {

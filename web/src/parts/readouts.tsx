@@ -25,9 +25,11 @@ export function Readouts({ robot, label = 'Measured now' }: { robot: Pick<Robot,
         is_beyond={beyond('estimate_m')}
       >
         <span>
-          {plus_minus(now.position_sd_m)} mm (2 sd){now.model && `, ${now.model}`}
+          {[`${plus_minus(now.position_sd_m)} mm (2 sd)`, now.stale ? '' : off_by(now.estimate_m, now.setpoint_m)]
+            .filter(Boolean)
+            .join(', ')}
         </span>
-        {now.stale ? <span class="silent">{silent}</span> : <span>{off_by(now.estimate_m, now.setpoint_m)}</span>}
+        {now.stale ? <span class="silent">{silent}</span> : <span>{now.model}</span>}
       </Numeral>
       <Numeral name="Controller sees" unit="mm" value={millimetres(now.position_m)} kind="seen" id="seen">
         <span>
