@@ -1,6 +1,6 @@
 // The view of a robot: its past and present in the plots, the setpoint that is dragged, and a gamepad.
 import assert from 'node:assert/strict';
-import { Bench, clear_latch, run, until } from './programs.mjs';
+import { Bench, clear_latch, run, trace_pixels, until } from './programs.mjs';
 
 const kRobot = 'rheo-1';
 const bench = new Bench();
@@ -25,22 +25,6 @@ async function value_at(share) {
   return text('.strip-0 .cursor');
 }
 
-// How much of a trace's colour is in a share of the first strip.
-const drawn = (from, to) =>
-  page.evaluate(
-    ([from, to]) => {
-      const canvas = document.querySelector('.strip-0 canvas');
-      const ratio = devicePixelRatio;
-      const [left, width] = [58 * ratio, canvas.width - 76 * ratio];
-      const x = Math.round(left + from * width);
-      const image = canvas.getContext('2d').getImageData(x, 20 * ratio, Math.max(1, Math.round((to - from) * width)), canvas.height - 60 * ratio);
-      let bright = 0; // white, the estimate, is the brightest
-      for (let at = 0; at < image.data.length; at += 4) if (image.data[at] > 225 && image.data[at + 1] > 225 && image.data[at + 3] > 200) bright += 1;
-      return bright;
-    },
-    [from, to],
-  );
-
 const steps = {
   async 'after a reload the past is there'() {
     await page.goto(await bench.login_link());
@@ -53,7 +37,7 @@ const steps = {
     await page.reload();
     await page.locator('.strip-0 canvas').waitFor();
     await live();
-    await until('what was before the reload is drawn', async () => (await drawn(0.78, 0.9)) > 20);
+    await until('what was before the reload is drawn', async () => (await trace_pixels(page, 0.78, 0.9)) > 20);
     await until('and has a value, with its ±', async () => /^\d+\.\d ± \d+\.\d mm at /.test(await value_at(0.88)));
   },
 
@@ -121,7 +105,7 @@ const steps = {
       return false;
     });
     await page.mouse.move(5, 5);
-    assert.equal(await drawn(gap - 0.005, gap + 0.005), 0, 'the gap is not bridged');
+    assert.equal(await trace_pixels(page, gap - 0.005, gap + 0.005), 0, 'the gap is not bridged');
   },
 
   async 'other traces can be chosen, and are kept'() {

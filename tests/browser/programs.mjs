@@ -49,6 +49,22 @@ export async function clear_latch(page) {
   });
 }
 
+// How much of the estimate's trace, the brightest colour of the dark page, is in a share of the first strip.
+export const trace_pixels = (page, from, to) =>
+  page.evaluate(
+    ([from, to]) => {
+      const canvas = document.querySelector('.strip-0 canvas');
+      const ratio = devicePixelRatio;
+      const [left, width] = [58 * ratio, canvas.width - 76 * ratio];
+      const x = Math.round(left + from * width);
+      const image = canvas.getContext('2d').getImageData(x, 20 * ratio, Math.max(1, Math.round((to - from) * width)), canvas.height - 60 * ratio);
+      let bright = 0;
+      for (let at = 0; at < image.data.length; at += 4) if (image.data[at] > 225 && image.data[at + 1] > 225 && image.data[at + 3] > 200) bright += 1;
+      return bright;
+    },
+    [from, to],
+  );
+
 const kLongestEnd_ms = 30_000;
 
 class Program {
@@ -114,6 +130,12 @@ export class Bench {
   // Robots ID-1 to ID-SIZE in one process.
   start_fleet(id, size) {
     this.fleet = new Program('rheonaut-sim', '--station', this.endpoints.robots, '--id', id, '--robots', String(size));
+  }
+
+  // A robot whose samples were recorded, `rate` times as fast: ID without its number, which is 1.
+  start_replay(id, rate) {
+    this.fleet = new Program('rheonaut-sim', 'replay', '--station', this.endpoints.robots, '--robots', '1',
+                             '--id', id.replace(/-1$/, ''), '--rate', String(rate));
   }
 
   // The network between a page and the station: `rheonaut-sim proxy`, and the words it is told.
@@ -194,7 +216,7 @@ export async function run(bench, steps, open) {
     for (const [number, page] of pages.entries()) {
       await page.screenshot({ path: `${out}failed_${number}.png` }).catch(() => undefined);
     }
-    console.error(`station:\n${bench.station?.output}\nrobot:\n${bench.robot?.output}`);
+    console.error(`station:\n${bench.station?.output}\nrobot:\n${bench.robot?.output}\nfleet:\n${bench.fleet?.output}`);
   } finally {
     await bench.close();
   }

@@ -24,6 +24,7 @@ export class DutyHold {
   private in_flight = 0;
   private stop_again: string | null = null; // a robot whose duty 0 may have been overtaken
   private timer: unknown = null;
+  private pressed_at_ms = 0;
   private renewed_at_ms = 0;
 
   constructor(private readonly ways: HoldWays) {}
@@ -34,7 +35,7 @@ export class DutyHold {
     this.duty = duty;
     this.error = null;
     this.lapsed = false;
-    this.renewed_at_ms = this.ways.now_ms();
+    this.pressed_at_ms = this.renewed_at_ms = this.ways.now_ms();
     this.timer = this.ways.set_interval(() => this.renew(), kRenew_ms);
     void this.send();
     this.ways.on_change();
@@ -57,7 +58,12 @@ export class DutyHold {
     this.ways.on_change();
   }
 
-  // The robot or the station ended it (emergency, mode change): nothing more to send.
+  // It runs by renewals alone, which the station takes from nobody but who is in control.
+  get is_past_first_lease(): boolean {
+    return this.robot_id !== null && this.ways.now_ms() - this.pressed_at_ms > kLease_ms;
+  }
+
+  // The robot or the station ended it (emergency, mode change, control taken by another): nothing more to send.
   forget(): void {
     if (this.robot_id === null) return;
     this.robot_id = null;

@@ -268,9 +268,17 @@ export class Session {
     this.store.refresh();
     this.vitals.refresh(this.store.selected.peek(), now_ms);
     this.emergency.look();
-    // A mode that takes no duty ended the hold; the hand has to press again.
-    const held_id = this.hold.robot_id;
-    if (held_id !== null && this.store.find(held_id)?.readout.peek().mode !== 'manual') this.hold.forget();
+    this.judge_hold();
+  }
+
+  // A mode that takes no duty, or somebody else in control, has ended the hold; the hand has to press again.
+  // SAFETY: nothing says that the motor runs by this hand while it does not.
+  private judge_hold(): void {
+    if (this.hold.robot_id === null) return;
+    const robot = this.store.find(this.hold.robot_id);
+    const holder = robot?.state.peek().control?.holder ?? null;
+    const is_taken = holder !== null && holder !== this.store.actor.peek() && this.hold.is_past_first_lease;
+    if (is_taken || robot?.readout.peek().mode !== 'manual') this.hold.forget();
   }
 
   // Asks for no more samples than a page can show; of all robots while they are few.

@@ -1,9 +1,13 @@
 // What the session does with what a page sends.
 import { afterEach, expect, test, vi } from 'vitest';
 import type { RobotState } from '../src/api';
+import { kLease_ms } from '../src/duty_hold';
 import { Session } from '../src/session';
 
-afterEach(() => vi.unstubAllGlobals());
+afterEach(() => {
+  vi.unstubAllGlobals();
+  vi.useRealTimers();
+});
 
 const robot = (robot_id: string, link: RobotState['link']) =>
   ({ robot_id, link, mode: 'manual', emergency_id: null, pending_stop: null }) as RobotState;
@@ -51,4 +55,34 @@ test('who is signed in is asked again until it is known', async () => {
   expect(session.me.value).toBeNull();
   await look();
   await vi.waitFor(() => expect(session.me.value?.role).toBe('admin'));
+});
+
+// SAFETY: the motor rests, whatever the hand does; the button must not say that it runs.
+test('a held duty ends on the page when somebody else has taken control, and nothing more is sent', async () => {
+  vi.useFakeTimers({ toFake: ['performance', 'setInterval', 'clearInterval'] });
+  const controlled_by = (holder: string | null) =>
+    ({ ...robot('a', 'connected'), control: holder && { holder, wished_by: null } }) as RobotState;
+  const session = session_beside(controlled_by(null));
+  const refresh = () => (session as unknown as { refresh(): void }).refresh();
+  const sent: number[] = [];
+  session.api.set_duty = (_, duty) => {
+    sent.push(duty);
+    return Promise.resolve({} as never);
+  };
+  session.link.send = () => true;
+  Object.assign(session.link, { stamp_us: 1, stamp_is_fresh: () => true });
+
+  session.store.receive({ type: 'robot', robot: controlled_by('session:2') }); // which is older than the press
+  session.hold.press('a', 0.3);
+  vi.advanceTimersByTime(100);
+  refresh();
+  expect(session.held.value.robot_id).toBe('a');
+  session.store.receive({ type: 'robot', robot: controlled_by('session:1') });
+  vi.advanceTimersByTime(5 * kLease_ms);
+  refresh();
+  expect(session.held.value.robot_id).toBe('a');
+  session.store.receive({ type: 'robot', robot: controlled_by('session:2') });
+  refresh();
+  expect(session.held.value.robot_id).toBeNull();
+  expect(sent).toEqual([0.3]);
 });

@@ -4,7 +4,7 @@
 
 import { signal, type Signal } from '@preact/signals';
 import { kAxis_px } from '../chart';
-import { plus_minus } from '../format';
+import { kSpread_sd, plus_minus } from '../format';
 import type { SampleRows } from '../samples';
 import { Deck } from './deck';
 import { DerivedRows, type DerivedSpec } from './derived';
@@ -193,8 +193,8 @@ function cursor_text(strip: Strip, window: TraceWindow, row: number | null, time
   };
   if (strip.name !== 'position') return `${strip.value(of(strip.name))} ${strip.unit}`;
   const [estimate_m, seen_m, setpoint_m] = [of('position'), of('seen'), of('setpoint')];
-  const high_m = window.value_at('estimate_high_m', row);
-  const spread = estimate_m === null || high_m === null ? '' : ` ${plus_minus((high_m - estimate_m) / 2)}`;
+  const spread_m = window.spread_at(row);
+  const spread = estimate_m === null || spread_m === null ? '' : ` ${plus_minus(spread_m / kSpread_sd)}`;
   if (estimate_m === null && seen_m === null) return `\u2013 ${when}`;
   const seen = seen_m === null || seen_m === estimate_m ? '' : `seen ${strip.value(seen_m)}`;
   const estimate = estimate_m === null ? '' : `${strip.value(estimate_m)}${spread}`;

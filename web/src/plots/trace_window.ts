@@ -29,6 +29,7 @@ export class TraceWindow {
   readonly high: Float64Array;
   size = 0;
   bin_s = 0;
+  private readonly bin_row: Int32Array; // the first row of the bin of each row
   private readonly in_hole: boolean[];
   private readonly min: Float64Array; // of the open bin
   private readonly max: Float64Array;
@@ -48,6 +49,7 @@ export class TraceWindow {
   ) {
     this.blocks = new Blocks(names);
     this.time_s = new Float64Array(capacity);
+    this.bin_row = new Int32Array(capacity);
     this.values = names.map(() => new Float64Array(capacity));
     this.gaps_s = names.map(() => []);
     [this.low, this.high, this.min, this.max] = [0, 1, 2, 3].map(() => new Float64Array(names.length)) as [
@@ -125,6 +127,20 @@ export class TraceWindow {
     if (at < 0) return null;
     const value = this.values[at]?.[row] ?? NaN;
     return Number.isFinite(value) ? value : null;
+  }
+
+  // How far the band of an estimate reaches from it in the bin of a row, on the side on which it reaches farther. The rows
+  // of a bin have the extremes of each column: what stands in one row need not be of one sample.
+  spread_at(row: number): number | null {
+    const first = this.bin_row[row] as number;
+    const last = first + 1 < this.size && this.bin_row[first + 1] === first ? first + 1 : first;
+    const ends = (column: AnyColumn) => {
+      const [one, other] = [this.value_at(column, first), this.value_at(column, last)];
+      return one === null || other === null ? null : [Math.min(one, other), Math.max(one, other)];
+    };
+    const [value, low, high] = [ends('estimate_m'), ends('estimate_low_m'), ends('estimate_high_m')];
+    if (!value || !low || !high) return null;
+    return Math.max((value[0] as number) - (low[0] as number), (high[1] as number) - (value[1] as number));
   }
 
   private clear(): void {
@@ -218,6 +234,7 @@ export class TraceWindow {
     const rows = is_one ? 1 : 2;
     this.time_s[row] = this.bin_first_s;
     if (!is_one) this.time_s[row + 1] = this.bin_last_s;
+    this.bin_row.fill(row, row, row + rows);
     this.size += rows;
     for (let c = 0; c < this.names.length; ++c) {
       const values = this.values[c] as Float64Array;

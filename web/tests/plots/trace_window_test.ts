@@ -109,6 +109,26 @@ test('the row under the cursor is the nearest, and none where nothing was sample
   expect(window.row_at(1090)).toBeNull();
 });
 
+test('the "±" of a pixel is that of its estimate, however far the estimate moves in it', () => {
+  const values = (...each: number[]) => Float64Array.from(each);
+  const columns = {
+    estimate_m: { min: values(0, 0.1), max: values(0.1, 0.1) },
+    estimate_low_m: { min: values(-0.02, 0.09), max: values(-0.02, 0.09) },
+    estimate_high_m: { min: values(0.12, 0.11), max: values(0.12, 0.11) },
+  };
+  const [first_s, last_s] = [values(100.1, 100.6), values(100.4, 100.9)];
+  const tile: Tile = { from_s: 0, to_s: 1e9, known_to_s: 1e9, first_s, last_s, columns };
+  const past = {
+    visit: (_: number, __: number, ___: number, point: (tile: Tile, at: number) => void) =>
+      first_s.forEach((____, at) => point(tile, at)),
+  };
+  const window = new TraceWindow(64, ['estimate_low_m', 'estimate_high_m', 'estimate_m']);
+  window.fill({ ring: new SampleRing(8), shift_s: 0, past }, { from_s: 100, to_s: 101 }, 2);
+  const found = Array.from({ length: window.size }, (_, row) => window.spread_at(row));
+  expect(found).toHaveLength(4);
+  [0.02, 0.02, 0.01, 0.01].forEach((wanted, row) => expect(found[row]).toBeCloseTo(wanted, 9));
+});
+
 test('a ring that grows keeps what it has', () => {
   const ring = ring_of(1000);
   ring.grow(65_536);
