@@ -1,6 +1,6 @@
 // What the session does with what a page sends.
 import { afterEach, expect, test, vi } from 'vitest';
-import type { RobotState } from '../src/api';
+import type { Recording, RobotState } from '../src/api';
 import { Session } from '../src/session';
 
 afterEach(() => vi.unstubAllGlobals());
@@ -51,4 +51,12 @@ test('who is signed in is asked again until it is known', async () => {
   expect(session.me.value).toBeNull();
   await look();
   await vi.waitFor(() => expect(session.me.value?.role).toBe('admin'));
+});
+
+test('of two looks at the recording the one that was asked for last counts, whichever comes last', () => {
+  const session = session_beside(robot('a', 'connected'));
+  const failing = { state: 'failing' } as Recording;
+  session.take_recording(failing, 200);
+  session.take_recording({ state: 'recording' } as Recording, 100);
+  expect(session.recording.value).toBe(failing);
 });

@@ -1,6 +1,7 @@
 // What several sections show: the station, its recording and its figures, asked for again and again.
 
 import { useComputed } from '@preact/signals';
+import { useEffect } from 'preact/hooks';
 import type { Recording, Station } from '../../api';
 import { plot_settings } from '../../plots/strips';
 import type { Session } from '../../session';
@@ -17,6 +18,7 @@ export interface Facts {
   pace: Pace | null;
   clock_off_ms: number; // the station's clock less this machine's
   asked_at_ms: number; // UTC
+  began_ms: number; // the same moment, by this page
 }
 
 // What each section is given.
@@ -44,8 +46,6 @@ export function useFacts(session: Session, api: StationApi): { facts: Facts | nu
       session.api.recording(),
       api.metrics().catch(() => null),
     ]);
-    session.station.value = station.answer;
-    session.recording.value = recording;
     meter.note(performance.now() / 1000, recording.counters);
     return {
       station: station.answer,
@@ -54,9 +54,15 @@ export function useFacts(session: Session, api: StationApi): { facts: Facts | nu
       pace: meter.pace(),
       clock_off_ms: station.answer.utc_us / 1000 - station.halfway_ms,
       asked_at_ms,
+      began_ms,
     };
   };
   const { answer, problem } = useAsked(session, ask, [], kLook_ms);
+  useEffect(() => {
+    if (!answer) return;
+    session.station.value = answer.station;
+    session.take_recording(answer.recording, answer.began_ms);
+  }, [answer]);
   return { facts: answer, problem };
 }
 
