@@ -243,7 +243,8 @@ export class Session {
       this.me.value = await this.api.me();
       void this.load_recording();
       this.fluids.value = await this.api.fluids();
-      this.store.set_runs(await this.api.open_runs());
+      const asked_at = this.store.mark();
+      this.store.set_runs(await this.api.open_runs(), asked_at);
       await this.load_newest_run(this.store.selected_id.peek());
     } catch (error) {
       this.store.note(error instanceof Error ? error.message : String(error));
@@ -267,8 +268,9 @@ export class Session {
 
   // The newest run of a robot may be one that was interrupted.
   private async load_newest_run(robot_id: string | null): Promise<void> {
+    const asked_at = this.store.mark();
     const run = robot_id === null ? null : await this.api.newest_run(robot_id);
-    if (run) this.store.take_run(run);
+    if (run) this.store.take_run_answer(run, asked_at);
   }
 
   private refresh(): void {
