@@ -5,7 +5,7 @@ import { useEffect } from 'preact/hooks';
 import type { Recording, Station } from '../../api';
 import { plot_settings } from '../../plots/strips';
 import type { Session } from '../../session';
-import { useAsked } from '../experiments/acts';
+import { refusal, useAsked } from '../experiments/acts';
 import { judge, type Fleet, type HealthLine } from './health';
 import type { Metrics } from './metrics';
 import { PaceMeter, type Pace } from './pace';
@@ -15,6 +15,7 @@ export interface Facts {
   station: Station;
   recording: Recording;
   metrics: Metrics | null;
+  metrics_problem: string; // why there are none
   pace: Pace | null;
   clock_off_ms: number; // the station's clock less this machine's
   asked_at_ms: number; // UTC
@@ -39,18 +40,23 @@ const meter = new PaceMeter(); // goes on counting when the view is opened again
 export function useFacts(session: Session, api: StationApi): { facts: Facts | null; problem: string } {
   const ask = async (): Promise<Facts> => {
     const [began_ms, asked_at_ms] = [performance.now(), Date.now()];
+    let metrics_problem = '';
     const [station, recording, metrics] = await Promise.all([
       session.api
         .station()
         .then((answer) => ({ answer, halfway_ms: asked_at_ms + (performance.now() - began_ms) / 2 })),
       session.api.recording(),
-      api.metrics().catch(() => null),
+      api.metrics().catch((error: unknown) => {
+        metrics_problem = refusal(error);
+        return null;
+      }),
     ]);
     meter.note(performance.now() / 1000, recording.counters);
     return {
       station: station.answer,
       recording,
       metrics,
+      metrics_problem,
       pace: meter.pace(),
       clock_off_ms: station.answer.utc_us / 1000 - station.halfway_ms,
       asked_at_ms,
@@ -95,6 +101,7 @@ export function useHealth({ session, facts, is_current }: Context): HealthLine[]
     station: facts?.station ?? null,
     recording: facts?.recording ?? null,
     metrics: facts?.metrics ?? null,
+    metrics_problem: facts?.metrics_problem ?? '',
     pace: facts?.pace ?? null,
     fleet,
     is_page_measured: is_measured,
