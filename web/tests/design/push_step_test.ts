@@ -7,7 +7,7 @@ import type { Session } from '../../src/session';
 import { Store } from '../../src/store';
 import { kNothing, type Design } from '../../src/views/design/address';
 import type { StepProps } from '../../src/views/design/parts';
-import { push_state, PushStep } from '../../src/views/design/push_step';
+import { PushStep } from '../../src/views/design/push_step';
 import { fake_document, FakeNode } from '../fake_dom';
 
 beforeEach(() => {
@@ -64,16 +64,15 @@ function drawn() {
     dragged: signal(null),
     pushed: signal(null),
     kept: signal(0),
-    tuning: { answer: signal({ phase: 'idle', result: null }), answer_to: () => null },
+    tuning: { answer_to: (key: string) => (key === 'asked' ? { job_id: 3, result: { feasible: true } } : null) },
     api: {
-      in_force: () => Promise.resolve(null),
       design: (id: number) => Promise.resolve({ design_id: id, name: 'made', document: {} }),
       push: (id: string, controller: number, is_confirmed: boolean) => ask(`${controller} to ${id}`, is_confirmed),
       restore: (id: string, is_confirmed: boolean) => ask(`restore ${id}`, is_confirmed),
     },
   };
   const page = new FakeNode(1, 'body');
-  const draw = async (design: Partial<Design>) => {
+  const draw = async (design: Partial<Design>, tune_key?: string) => {
     const props = {
       session,
       work,
@@ -81,7 +80,8 @@ function drawn() {
       runs: { answer: null, problem: '' },
       designs: [],
       model: null,
-      in_force: { robot_id: 'sim-1', found: null, is_read: true },
+      in_force: { found: null, is_read: true },
+      tune: tune_key === undefined ? null : { key: tune_key, body: {} },
     } as unknown as StepProps;
     render(h(PushStep, props), page as unknown as Element);
     await vi.advanceTimersByTimeAsync(100);
@@ -148,7 +148,13 @@ test('what failed is told of the robot and the controller that it failed with', 
   expect(state()).toBe('ready to be sent to sim-2');
 });
 
-test('a controller that runs is not called failed', () => {
-  const situation = { robot_id: 'sim-1', runs_it: true, is_current: true, pending: '', problem: 'not verified in 5 s' };
-  expect(push_state({ ...situation, design: { ...kNothing, controller: 8 } }).kind).toBe('done');
+test('what was tuned is kept only while it is what is asked now', async () => {
+  const { page, draw } = drawn();
+  const is_disabled = () => 'disabled' in page.find('design-keep-controller')!.attributes;
+  await draw({}, 'asked');
+  expect(is_disabled()).toBe(false);
+  await draw({}, 'asked for another model');
+  expect(is_disabled()).toBe(true);
+  await draw({});
+  expect(is_disabled()).toBe(true);
 });

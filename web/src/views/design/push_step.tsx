@@ -27,12 +27,7 @@ export function PushStep(props: StepProps) {
     [design.controller],
   );
   const kept = controller.answer?.id === design.controller ? (controller.answer?.found ?? null) : null;
-  const in_force = useAsked(
-    session,
-    async () => ({ robot_id, found: robot_id === '' ? null : await work.api.in_force(robot_id) }),
-    [robot_id, state?.controller_checksum, state?.link, work.pushed.value],
-  );
-  const reported = in_force.answer?.robot_id === robot_id ? (in_force.answer?.found ?? null) : null;
+  const reported = props.in_force.found;
   const discretised = kept ? discretised_of(kept.document) : null;
   const rows = discretised ? compared(sent_form(discretised), reported?.controller ?? null) : [];
   const is_current = store.is_current.value && reported?.is_current === true && robot?.is_away.value === false;
@@ -159,11 +154,11 @@ function RobotList({ session, design }: StepProps) {
   );
 }
 
-function KeepController({ session, work, design, designs, model }: StepProps) {
+function KeepController({ session, work, design, designs, model, tune }: StepProps) {
   const name = useSignal('');
   const { pending, problem, act } = useActs();
-  const { phase, result, job_id } = work.tuning.answer.value;
-  const is_ready = phase === 'done' && result?.feasible === true && work.dragged.value === null;
+  const answer = work.tuning.answer_to(tune?.key);
+  const is_ready = answer?.result?.feasible === true && work.dragged.value === null;
   const kept = designs.find(({ design_id }) => design_id === design.controller);
   if (design.controller !== null)
     return (
@@ -176,7 +171,7 @@ function KeepController({ session, work, design, designs, model }: StepProps) {
   const usual = `${number_text(design.crossover_rad_s)} rad/s, ${number_text(design.margin_deg)}°${of_model}`;
   const keep = () =>
     act('keep', async () => {
-      const made = await work.api.keep('controller', name.peek().trim() || usual, job_id!);
+      const made = await work.api.keep('controller', name.peek().trim() || usual, answer!.job_id!);
       work.kept.value += 1;
       change_design({ ...design, controller: made.design_id, robot: session.store.selected_id.peek() ?? design.robot });
     });

@@ -27,7 +27,7 @@ export function predicted_for(
   return step.cause === 'disturbance' && is_of_size(-disturbance_m) ? predicted.disturbance : null;
 }
 
-export function VerifyStep({ session, work, design, runs }: StepProps) {
+export function VerifyStep({ session, work, design, runs, tune }: StepProps) {
   const robot_id = session.store.selected_id.value ?? '';
   const own = (runs.answer?.runs ?? []).filter(
     (run) => run.state !== 'open' && (run.robot_id === robot_id || run.run_id === design.verified),
@@ -40,7 +40,7 @@ export function VerifyStep({ session, work, design, runs }: StepProps) {
   );
   const found = metrics.answer?.id === design.verified ? (metrics.answer?.found ?? null) : null;
   const run = own.find(({ run_id }) => run_id === design.verified);
-  const tuned = work.tuning.answer.value.phase === 'done' ? work.tuning.answer.value.result : null;
+  const tuned = work.tuning.answer_to(tune?.key)?.result ?? null;
   const checksum = session.store.selected.value?.state.value.controller_checksum;
   const is_other = run !== undefined && run.robot_id === robot_id && run.controller_checksum !== checksum;
   return (
