@@ -182,6 +182,9 @@ const steps = {
     for (const step of ['runs', 'identify', 'tune', 'push', 'verify']) await is_in_state(step, 'done');
     assert.match(await text('#design-list'), /controller\s+model 1, softener[\s\S]*softener\s+model\s+run 1/);
     assert.ok(await page.locator('#design-undo').isDisabled(), 'what lies before the view is no step of it');
+    await page.click('#design-to-verify');
+    await until('the step is in sight', async () => (await page.locator('#design-part-verify').boundingBox()).y < 600);
+    assert.ok((await page.locator('#emergency-stop').boundingBox()).y > 0, 'SAFETY: a jump to a step leaves the stop button in sight');
     await page.click('#open-fleet');
     await page.locator('#fleet-list li').first().waitFor();
     await page.click('#open-design');

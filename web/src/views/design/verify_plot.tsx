@@ -72,7 +72,7 @@ export function VerifyPlots({ session, work, run_id, tuned, compared }: VerifyPl
       ))}
       <p class="design-keys">
         <span class="design-key measured">by the robot’s own estimate, ± {kSpread_sd} sd</span>
-        <span class="design-key curve-0">predicted</span>
+        <span class="design-key curve-0 predicted">predicted</span>
         <span class="design-key commanded">setpoint</span>
       </p>
     </figure>
@@ -120,10 +120,10 @@ function StepGraph(props: Compared & { id: string; curve: Curve; samples: readon
           {parts.map((part, at) => (
             <path key={at} class="spread" d={`${path_of(place, [...edge(part, -1), ...edge(part, 1).reverse()])}Z`} />
           ))}
-          <path class="curve curve-0" d={path_of(place, model)} />
           {parts.map((part, at) => (
             <path key={at} class="curve measured" d={path_of(place, edge(part, 0))} />
           ))}
+          <path class="curve curve-0 predicted" d={path_of(place, model)} />
         </>
       )}
     />
