@@ -295,7 +295,7 @@ const steps = {
     page.on('pageerror', (error) => faults.push(error.message));
     await page.goto(bench.http);
     await page.fill('#user', 'vera');
-    await page.fill('#password', 'correct horse battery');
+    await page.fill('#password', 'another horse battery');
     await page.press('#password', 'Enter');
     await page.click('#open-station');
     await until('health is judged', async () => (await word('recording')) === 'good');
