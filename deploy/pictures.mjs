@@ -97,7 +97,7 @@ async function prepare() {
 }
 
 async function take_pictures() {
-  const steps = await perform('Step, disturbance, back', kSteps, 'repeat = 2\n[conditions]\nfluid = "non_newtonian"');
+  const steps = await perform('Step, disturbance, back', kSteps, '[conditions]\nfluid = "non_newtonian"\n[sweep]\nrepeats = 2');
   const excited = await perform('Identification', kExcitation);
   const fit = await job({ kind: 'identify', run_id: excited.runs[0] });
   const kept = await bench.post('/designs', { kind: 'model', name: 'fabric softener', job_id: fit });

@@ -102,9 +102,10 @@ const steps = {
   },
 
   async 'a model is identified from a run, with its progress, and tried on what was not fitted'() {
-    await page.goto(`${bench.http}/#/design`);
     const { run_id } = await recorded('Excited', 'duty_max = 0.6', '[[step]]\nkind = "rest"\nfor_s = 1\n\n[[step]]\nkind = "prbs"\namplitude = 0.6\nbit_s = 0.2\nfor_s = 10\n');
-    await page.locator(`#design-run-${run_id}`).check();
+    await page.goto(`${bench.http}/#/runs/${run_id}`);
+    await page.click('#run-to-design');
+    await page.locator(`#design-run-${run_id}:checked`).waitFor();
     await choose('design-structure', 'second order');
     await page.fill('#design-to', '8');
     await page.press('#design-to', 'Enter');
@@ -167,6 +168,8 @@ const steps = {
     await page.locator('#design-compared').waitFor();
     const rows = await text('#design-compared');
     assert.match(rows, /setpoint, [−\d]+ to 100 mm[\s\S]*estimate ± \d/);
+    await page.locator('#design-verify-0 path.measured').first().waitFor();
+    await page.locator('#design-verify-0 path.spread').first().waitFor();
     assert.match(await text('#design-part-verify'), /says what the robot believed, not where it was/);
     assert.match(await page.locator('#design-verify-link').getAttribute('href'), /profile=figure_7&robot=sim-1/);
     await says(`verified=${run_id}`);
@@ -179,6 +182,9 @@ const steps = {
     for (const step of ['runs', 'identify', 'tune', 'push', 'verify']) await is_in_state(step, 'done');
     assert.match(await text('#design-list'), /controller\s+model 1, softener[\s\S]*softener\s+model\s+run 1/);
     assert.ok(await page.locator('#design-undo').isDisabled(), 'what lies before the view is no step of it');
+    await page.click('#design-to-verify');
+    await until('the step is in sight', async () => (await page.locator('#design-part-verify').boundingBox()).y < 600);
+    assert.ok((await page.locator('#emergency-stop').boundingBox()).y > 0, 'SAFETY: a jump to a step leaves the stop button in sight');
     await page.click('#open-fleet');
     await page.locator('#fleet-list li').first().waitFor();
     await page.click('#open-design');

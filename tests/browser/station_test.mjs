@@ -99,6 +99,13 @@ const steps = {
     await until('the row has the new role', async () => (await row.locator('.role').innerText()) === 'viewer');
     const { users } = await bench.ask('/users');
     assert.deepEqual(users.map(({ name, role }) => [name, role]), [['vera', 'viewer']]);
+    await row.locator('button').click();
+    await page.fill('#station-edit-password', 'another horse battery');
+    await page.click('#station-save-user');
+    await page.locator('#station-user-changed').waitFor();
+    assert.equal(await text('#station-changed-password'), 'another horse battery');
+    await page.locator('#station-user-changed button', { hasText: 'Done' }).click();
+    await page.locator('#station-user-changed').waitFor({ state: 'detached' });
   },
 
   async 'a one-time link works once and is gone when it is done'() {
@@ -288,7 +295,7 @@ const steps = {
     page.on('pageerror', (error) => faults.push(error.message));
     await page.goto(bench.http);
     await page.fill('#user', 'vera');
-    await page.fill('#password', 'correct horse battery');
+    await page.fill('#password', 'another horse battery');
     await page.press('#password', 'Enter');
     await page.click('#open-station');
     await until('health is judged', async () => (await word('recording')) === 'good');

@@ -112,6 +112,7 @@ export class Session {
 
   private refreshed_at_ms = 0;
   private let_pass = false;
+  private recording_asked_at_ms = -Infinity;
   private looked_at: string[] = []; // robots, the latest first
 
   // The name under which a notice about a run is dismissed; run numbers begin anew with each store.
@@ -224,7 +225,16 @@ export class Session {
   private async load_recording(): Promise<void> {
     if (this.phase.peek() !== 'live') return;
     if (this.me.peek() === null) void this.load(); // the answer did not come in time: without it nobody has controls
-    this.recording.value = await this.api.recording().catch(() => this.recording.peek());
+    const asked_at_ms = performance.now();
+    const recording = await this.api.recording().catch(() => null);
+    if (recording) this.take_recording(recording, asked_at_ms);
+  }
+
+  // Alarms follow from it: an answer that was asked for earlier does not replace a newer one.
+  take_recording(recording: Recording, asked_at_ms: number): void {
+    if (asked_at_ms < this.recording_asked_at_ms) return;
+    this.recording_asked_at_ms = asked_at_ms;
+    this.recording.value = recording;
   }
 
   private async load(): Promise<void> {
@@ -233,7 +243,8 @@ export class Session {
       this.me.value = await this.api.me();
       void this.load_recording();
       this.fluids.value = await this.api.fluids();
-      this.store.set_runs(await this.api.open_runs());
+      const asked_at = this.store.mark();
+      this.store.set_runs(await this.api.open_runs(), asked_at);
       await this.load_newest_run(this.store.selected_id.peek());
     } catch (error) {
       this.store.note(error instanceof Error ? error.message : String(error));
@@ -257,8 +268,9 @@ export class Session {
 
   // The newest run of a robot may be one that was interrupted.
   private async load_newest_run(robot_id: string | null): Promise<void> {
+    const asked_at = this.store.mark();
     const run = robot_id === null ? null : await this.api.newest_run(robot_id);
-    if (run) this.store.take_run(run);
+    if (run) this.store.take_run_answer(run, asked_at);
   }
 
   private refresh(): void {

@@ -37,6 +37,8 @@ export class Store {
   readonly is_current = signal(false);
   readonly runs = signal<RunRecord[]>([]); // that are open, at most one for each robot
   readonly interrupted = signal<RunRecord[]>([]); // of each robot its newest run, if the station stopped in it
+  private run_reports = 0; // so far
+  private readonly runs_reported = new Map<number, number>(); // of each run: the number of its latest report
   readonly latches = new Latches();
   readonly command_listeners = new Set<(command: CommandRecord) => void>(); // called with each record that comes
   readonly now_ms = signal(0); // page time, for ages
@@ -108,11 +110,28 @@ export class Store {
     });
   }
 
-  set_runs(open: RunRecord[]): void {
-    this.runs.value = open;
+  // To be had before runs are asked for, and given back with the answer: what was reported since is newer than the answer.
+  mark(): number {
+    return this.run_reports;
+  }
+
+  // All that are open, as the station has listed them.
+  set_runs(open: RunRecord[], asked_at = this.mark()): void {
+    const is_newer = ({ run_id }: RunRecord) => (this.runs_reported.get(run_id) ?? 0) > asked_at;
+    this.runs.value = [...open.filter((run) => !is_newer(run)), ...this.runs.peek().filter(is_newer)];
+  }
+
+  take_run_answer(run: RunRecord, asked_at: number): void {
+    if ((this.runs_reported.get(run.run_id) ?? 0) <= asked_at) this.keep_run(run);
   }
 
   take_run(run: RunRecord): void {
+    this.run_reports += 1;
+    this.runs_reported.set(run.run_id, this.run_reports);
+    this.keep_run(run);
+  }
+
+  private keep_run(run: RunRecord): void {
     const others = this.runs.peek().filter((other) => other.run_id !== run.run_id);
     this.runs.value = run.ended_at_us === null ? [...others, run] : others;
     this.take_interruption(run);

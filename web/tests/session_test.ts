@@ -1,6 +1,6 @@
 // What the session does with what a page sends.
 import { afterEach, expect, test, vi } from 'vitest';
-import type { RobotState } from '../src/api';
+import type { Recording, RobotState } from '../src/api';
 import { kLease_ms } from '../src/duty_hold';
 import { Session } from '../src/session';
 
@@ -85,4 +85,12 @@ test('a held duty ends on the page when somebody else has taken control, and not
   refresh();
   expect(session.held.value.robot_id).toBeNull();
   expect(sent).toEqual([0.3]);
+});
+
+test('of two looks at the recording the one that was asked for last counts, whichever comes last', () => {
+  const session = session_beside(robot('a', 'connected'));
+  const failing = { state: 'failing' } as Recording;
+  session.take_recording(failing, 200);
+  session.take_recording({ state: 'recording' } as Recording, 100);
+  expect(session.recording.value).toBe(failing);
 });

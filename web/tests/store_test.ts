@@ -217,6 +217,23 @@ test('an open run is shown until it ends', () => {
   expect(store.runs.value).toHaveLength(0);
 });
 
+test('a list of open runs that was asked for earlier takes back nothing that was reported since', () => {
+  const { store } = store_with(robot('rheo-1'));
+  const run = (run_id: number, ended_at_us: number | null = null) =>
+    ({ run_id, robot_id: 'rheo-1', ended_at_us }) as never as Parameters<Store['take_run']>[0];
+  const open = () => store.runs.value.map(({ run_id }) => run_id);
+  store.take_run(run(6));
+  const asked_at = store.mark();
+  store.receive({ type: 'run', run: run(7, 5) });
+  store.receive({ type: 'run', run: run(8) });
+  store.set_runs([run(7)], asked_at);
+  expect(open()).toEqual([8]); // 6 is listed no more, 7 has ended since, 8 has begun since
+  store.take_run_answer(run(7), asked_at); // the newest run of a robot is asked for as well
+  expect(open()).toEqual([8]);
+  store.set_runs([run(9)], store.mark());
+  expect(open()).toEqual([9]);
+});
+
 test('a robot whose samples are not asked for shows link and mode, and no old numbers', () => {
   const { store, clock } = store_with(robot('rheo-1'), robot('rheo-2', { mode: 'auto' }));
   store.is_current.value = true;

@@ -1,11 +1,14 @@
 // A design as an address, and the steps that "back" undoes.
 import { beforeEach, expect, test } from 'vitest';
 import { parse } from '../../src/route';
+import type { StoredDesign } from '../../src/views/design/design_api';
+import { kPaperPlants } from '../../src/views/design/frequency';
 import {
   address_of,
   kNothing,
   parse_design,
   Steps,
+  with_controller,
   with_plant,
   with_run,
   type Design,
@@ -131,4 +134,19 @@ test('what no person has chosen is no step', () => {
   steps.undo();
   expect(steps.last).toBe('#/design');
   expect(steps.can_undo.value).toBe(false);
+});
+
+test('a controller that is kept brings the plant and the specification that it was tuned for, or no plant', () => {
+  const design = { ...kNothing, model: 5, verified: 9 };
+  const used = (options: object, model_id: number | null = null) =>
+    with_controller(design, { design_id: 8, kind: 'controller', model_id, options } as StoredDesign);
+  const asked = { crossover_rad_s: 2, phase_margin_deg: 80 };
+  const as_asked = { ...kNothing, controller: 8, crossover_rad_s: 2, margin_deg: 80 };
+  expect(used({ ...asked, model_id: 7 }, 7)).toEqual({ ...as_asked, model: 7 });
+  expect(used({ ...asked, fluid: 'water' })).toEqual({ ...as_asked, fluid: 'water' });
+  expect(used({ ...asked, plant: { ...kPaperPlants['28'] } })).toEqual({ ...as_asked, paper: '28' });
+  const without_plant = { ...kNothing, controller: 8 };
+  expect(used({ ...asked, plant: { ...kPaperPlants['28'], kp: 200 } })).toEqual(without_plant);
+  expect(used({ fluid: 'water' })).toEqual(without_plant);
+  expect(used({ ...asked, crossover_rad_s: 0.2 }, 7)).toEqual(without_plant); // no address can say it
 });

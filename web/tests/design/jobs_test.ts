@@ -136,3 +136,11 @@ test('a link opens a job that exists', async () => {
   question.forget();
   expect(question.answer.value).toMatchObject({ phase: 'idle', result: null, job_id: null });
 });
+
+test('an answer is one to its own question alone', async () => {
+  const { station, question } = asked();
+  await station.say(job(1, done));
+  expect(question.answer_to('a')?.result).toEqual({ kp: 30 });
+  expect(question.answer_to('b')).toBeNull();
+  expect(question.answer_to(undefined)).toBeNull();
+});

@@ -1,9 +1,10 @@
 // Times, pace and Prometheus' text as the view of the station reads them.
 
 import { expect, test } from 'vitest';
+import type { Recording } from '../../src/api';
 import { Metrics } from '../../src/views/station/metrics';
 import { ago_text, backup_name, exact_text, moment_text, span_text } from '../../src/views/station/moments';
-import { bytes_per_day, full_in_s, PaceMeter } from '../../src/views/station/pace';
+import { bytes_per_day, full_in_s, is_within_disk, PaceMeter } from '../../src/views/station/pace';
 import { backup_problem } from '../../src/views/station/station_api';
 
 const kAt_us = Date.UTC(2026, 10, 26, 5, 50, 35) * 1000 + 496_012;
@@ -61,6 +62,16 @@ test('until the disk is full', () => {
   expect(bytes_per_day(pace)).toBe(200 * 66 * 86_400);
   expect(full_in_s(pace, 200 * 66 * 50)).toBeCloseTo(50);
   expect(full_in_s({ ...pace, samples_per_s: 0 }, 1e9)).toBeNull();
+});
+
+test('a limit keeps the disk from filling only where it fits on the disk and can be kept', () => {
+  const recording = (max_database_bytes: number, all_held = false) =>
+    ({ retention: { max_database_bytes, all_held }, database_bytes: 300, free_bytes: 700 }) as Recording;
+  expect(is_within_disk(recording(1000))).toBe(true);
+  expect(is_within_disk(recording(1001))).toBe(false);
+  expect(is_within_disk(recording(1000, true))).toBe(false); // runs hold all that is left
+  expect(is_within_disk(recording(200))).toBe(true); // it shrinks
+  expect(is_within_disk(recording(0))).toBe(false); // no limit
 });
 
 const kText = `# HELP rheonaut_exceptions_total What ended by a fault.

@@ -2,7 +2,7 @@
 
 import { expect, test } from 'vitest';
 import type { Recording, Station } from '../../src/api';
-import { judge, summary_of, type HealthInput, type Word } from '../../src/views/station/health';
+import { judge, lead_of, summary_of, type HealthInput, type Word } from '../../src/views/station/health';
 import { Metrics } from '../../src/views/station/metrics';
 
 const kNow_ms = Date.UTC(2026, 10, 26);
@@ -59,6 +59,7 @@ const kGood: HealthInput = {
   station: kStation,
   recording: kRecording,
   metrics: kMetrics,
+  metrics_problem: '',
   pace: { samples_per_s: 200, commits: 20, over_s: 10 },
   fleet: { connected: 2, known: 3, silent: 0, unstoppable: 0, unmeasured: 0, samples_per_s: 200, worst_ms: 0.4 },
   is_page_measured: true,
@@ -183,4 +184,19 @@ test('silent robots, slow links, refused connections, faults and a wrong clock a
 test('worst first counts: bad before what is to be looked at', () => {
   const lines = judge({ ...kGood, ...fleet({ unstoppable: 1, silent: 1 }) });
   expect(summary_of(lines)).toMatchObject({ word: 'bad', text: '1 bad, 1 to look at' });
+});
+
+test('SAFETY: nothing needs you only where every line is known', () => {
+  expect(lead_of(judge(kGood))).toMatch(/^Nothing needs you\./);
+  const without_figures = judge({ ...kGood, metrics: null, metrics_problem: 'The station answered 503 to /metrics.' });
+  expect(lead_of(without_figures)).toBe(
+    'What is known is well. Not known: Stops until now, Faults inside, Connections.',
+  );
+  expect(without_figures.find(({ name }) => name === 'faults')).toMatchObject({
+    word: 'unknown',
+    note: 'Not read: The station answered 503 to /metrics.',
+  });
+  expect(lead_of(judge({ ...kGood, ...fleet({ silent: 1 }), pace: null }))).toBe(
+    'Look at: Robots. Not known: Writes to the disk.',
+  );
 });

@@ -4,6 +4,8 @@
 
 import { signal } from '@preact/signals';
 import { format, go_to, type Route } from '../../route';
+import type { StoredDesign } from './design_api';
+import { kPaperPlants, type Plant } from './frequency';
 
 export const kStructures = ['', 'first_order', 'second_order', 'fractional'] as const;
 export type Structure = (typeof kStructures)[number]; // '': all three, the best
@@ -107,6 +109,29 @@ export const address_of = (design: Design) => format({ view: 'design', query: de
 export function with_plant(design: Design, plant: Partial<Pick<Design, 'model' | 'fluid' | 'paper'>>): Design {
   return { ...design, model: null, fluid: '', paper: '', controller: null, verified: null, ...plant };
 }
+
+// A controller that is kept, with the plant and the specification that it was tuned for. Where these are not known no plant
+// is chosen: what would be predicted for another one is not what this controller does.
+export function with_controller(design: Design, controller: StoredDesign): Design {
+  const { fluid, plant, ...asked } = controller.options as Partial<Record<string, unknown>>;
+  const paper = (['29', '28'] as const).find((name) => is_same_plant(plant, kPaperPlants[name]));
+  const chosen =
+    controller.model_id !== null
+      ? { model: controller.model_id }
+      : typeof fluid === 'string'
+        ? { fluid }
+        : paper && { paper };
+  const crossover_rad_s = number_of(String(asked['crossover_rad_s']), kCrossover.from, kCrossover.to);
+  const margin_deg = number_of(String(asked['phase_margin_deg']), kMargin.from, kMargin.to);
+  const tuned_for =
+    chosen && crossover_rad_s !== null && margin_deg !== null
+      ? { ...with_plant(design, chosen), crossover_rad_s, margin_deg }
+      : with_plant(design, {});
+  return { ...tuned_for, controller: controller.design_id };
+}
+
+const is_same_plant = (given: unknown, plant: Plant) =>
+  Object.entries(plant).every(([name, value]) => (given as Record<string, unknown> | undefined)?.[name] === value);
 
 // Runs that a person adds or takes out; a fit of other runs is not theirs.
 export function with_run(design: Design, run_id: number, is_in: boolean): Design {

@@ -7,9 +7,9 @@ import { address_of, note_in_address, parse_design } from './address';
 import { IdentifyStep } from './identify_step';
 import { Kept } from './kept';
 import { PushStep } from './push_step';
-import { useRuns } from './parts';
+import { useInForce, useRuns } from './parts';
 import { RunsStep } from './runs_step';
-import { TuneStep } from './tune_step';
+import { tune_body, TuneStep } from './tune_step';
 import { VerifyStep } from './verify_step';
 import { work_of, type DesignWork } from './work';
 import { parse } from '../../route';
@@ -38,7 +38,10 @@ export default function DesignView({ session, route }: ViewProps) {
     return id === null ? null : { id, found: await work.api.design(id).catch((error: unknown) => refusal(error)) };
   }, [design.model]);
   const model_found = model.answer?.id === design.model ? (model.answer?.found ?? null) : null;
-  const shared = { session, work, design, runs, designs: designs.answer ?? [], model: model_found };
+  const in_force = useInForce(session, work);
+  const body = tune_body(design, in_force.found?.controller ?? null);
+  const tune = body && { body, key: JSON.stringify(body) };
+  const shared = { session, work, design, runs, designs: designs.answer ?? [], model: model_found, in_force, tune };
   return (
     <>
       <section class="view-head design-head" aria-label="Steps back and forth">

@@ -37,6 +37,12 @@ export class Question<Result> {
 
   constructor(private readonly api: JobsApi) {}
 
+  // What was answered to this question; null: another one was asked last.
+  answer_to(key: string | undefined): Answer<Result> | null {
+    const answer = this.answer.value;
+    return key !== undefined && answer.key === key ? answer : null;
+  }
+
   // Nothing is asked twice: the same question keeps its answer, unless it failed.
   ask(key: string, body: JobBody): void {
     const { key: asked, phase } = this.answer.peek();

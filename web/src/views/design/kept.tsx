@@ -5,7 +5,7 @@ import { date_and_time } from '../../format';
 import { format } from '../../route';
 import { useAsked } from '../experiments/acts';
 import { who } from '../experiments/words';
-import { change_design, with_plant } from './address';
+import { change_design, with_controller, with_plant } from './address';
 import type { DesignComparison, StoredDesign } from './design_api';
 import type { StepProps } from './parts';
 import { fixed_text, number_text, with_sigma } from './words';
@@ -27,13 +27,10 @@ export function Kept({ session, work, design, designs, problem, is_asked }: Kept
     const rest = chosen.value.filter((other) => other !== id);
     chosen.value = is_in ? [...rest, id].slice(-2) : rest;
   };
-  const use = (each: StoredDesign) => {
-    if (each.kind === 'model') change_design(with_plant(design, { model: each.design_id }));
-    else {
-      const plant = each.model_id === null ? design : with_plant(design, { model: each.model_id });
-      change_design({ ...plant, ...asked_of(each), controller: each.design_id });
-    }
-  };
+  const use = (each: StoredDesign) =>
+    change_design(
+      each.kind === 'model' ? with_plant(design, { model: each.design_id }) : with_controller(design, each),
+    );
   return (
     <section class="design-kept" id="design-kept" aria-labelledby="design-kept-title">
       <h2 id="design-kept-title">Kept models and controllers</h2>
@@ -118,14 +115,6 @@ export function Kept({ session, work, design, designs, problem, is_asked }: Kept
       )}
     </section>
   );
-}
-
-// What was asked for a controller that the station has tuned.
-function asked_of({ options }: StoredDesign): { crossover_rad_s?: number; margin_deg?: number } {
-  const { crossover_rad_s, phase_margin_deg } = options as { crossover_rad_s?: unknown; phase_margin_deg?: unknown };
-  return typeof crossover_rad_s === 'number' && typeof phase_margin_deg === 'number'
-    ? { crossover_rad_s, margin_deg: phase_margin_deg }
-    : {};
 }
 
 function Ancestry({ design, designs }: { design: StoredDesign; designs: StoredDesign[] }) {

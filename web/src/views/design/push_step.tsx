@@ -27,17 +27,17 @@ export function PushStep(props: StepProps) {
     [design.controller],
   );
   const kept = controller.answer?.id === design.controller ? (controller.answer?.found ?? null) : null;
-  const in_force = useAsked(
-    session,
-    async () => ({ robot_id, found: robot_id === '' ? null : await work.api.in_force(robot_id) }),
-    [robot_id, state?.controller_checksum, state?.link, work.pushed.value],
-  );
-  const reported = in_force.answer?.robot_id === robot_id ? (in_force.answer?.found ?? null) : null;
+  const reported = props.in_force.found;
   const discretised = kept ? discretised_of(kept.document) : null;
   const rows = discretised ? compared(sent_form(discretised), reported?.controller ?? null) : [];
   const is_current = store.is_current.value && reported?.is_current === true && robot?.is_away.value === false;
   const runs_it = rows.length > 0 && rows.every(({ is_same }) => is_same);
   const acts = useActs();
+  // What is asked of whom: an answer, or a confirmation, is to this and to nothing else.
+  const question = `${robot_id} ${design.controller ?? ''} ${state?.controller_checksum ?? ''}`;
+  const asked = useSignal(''); // the question that `acts` is about
+  const problem = asked.value === question ? acts.problem.value : '';
+  const is_done = runs_it && is_current;
   return (
     <Step
       work={work}
@@ -50,7 +50,7 @@ export function PushStep(props: StepProps) {
         runs_it,
         is_current,
         pending: acts.pending.value,
-        problem: acts.problem.value,
+        problem,
       })}
     >
       <div class="design-columns">
@@ -58,7 +58,19 @@ export function PushStep(props: StepProps) {
           <RobotList {...props} />
           {robot && may_command(session) && <ControlLine session={session} robot={robot} />}
           <KeepController {...props} />
-          <Send {...props} acts={acts} is_auto={state?.mode === 'auto'} />
+          {/* SAFETY: what was confirmed for one robot and controller is not confirmed for another. */}
+          <Send
+            {...props}
+            key={question}
+            acts={acts}
+            is_auto={state?.mode === 'auto'}
+            on_ask={() => (asked.value = question)}
+          />
+          {is_done && (
+            <p class="problem" role="alert">
+              {problem}
+            </p>
+          )}
         </div>
         <div>
           {kept === null ? (
@@ -103,8 +115,8 @@ export function push_state(situation: PushSituation): StepState {
   if (pending !== '' && pending !== 'keep') return { kind: 'running', text: `${pending}…` };
   if (design.controller === null) return { kind: 'needs', text: 'needs a controller that is kept' };
   if (robot_id === '') return { kind: 'needs', text: 'needs a robot' };
-  if (problem !== '') return { kind: 'failed', text: `failed: ${problem}` };
   if (runs_it && is_current) return { kind: 'done', text: `${robot_id} runs it, the same bit for bit` };
+  if (problem !== '') return { kind: 'failed', text: `failed: ${problem}` };
   if (runs_it) return { kind: 'ready', text: `${robot_id} reported it last; what it runs now is not known` };
   return { kind: 'ready', text: `ready to be sent to ${robot_id}` };
 }
@@ -142,11 +154,11 @@ function RobotList({ session, design }: StepProps) {
   );
 }
 
-function KeepController({ session, work, design, designs, model }: StepProps) {
+function KeepController({ session, work, design, designs, model, tune }: StepProps) {
   const name = useSignal('');
   const { pending, problem, act } = useActs();
-  const { phase, result, job_id } = work.tuning.answer.value;
-  const is_ready = phase === 'done' && result?.feasible === true && work.dragged.value === null;
+  const answer = work.tuning.answer_to(tune?.key);
+  const is_ready = answer?.result?.feasible === true && work.dragged.value === null;
   const kept = designs.find(({ design_id }) => design_id === design.controller);
   if (design.controller !== null)
     return (
@@ -159,7 +171,7 @@ function KeepController({ session, work, design, designs, model }: StepProps) {
   const usual = `${number_text(design.crossover_rad_s)} rad/s, ${number_text(design.margin_deg)}°${of_model}`;
   const keep = () =>
     act('keep', async () => {
-      const made = await work.api.keep('controller', name.peek().trim() || usual, job_id!);
+      const made = await work.api.keep('controller', name.peek().trim() || usual, answer!.job_id!);
       work.kept.value += 1;
       change_design({ ...design, controller: made.design_id, robot: session.store.selected_id.peek() ?? design.robot });
     });
@@ -197,35 +209,46 @@ function KeepController({ session, work, design, designs, model }: StepProps) {
 interface SendProps extends StepProps {
   acts: ReturnType<typeof useActs>;
   is_auto: boolean;
+  on_ask(): void;
 }
 
-function Send({ session, work, design, acts, is_auto }: SendProps) {
+type Sending = 'sending' | 'restoring';
+
+function Send({ session, work, design, acts, is_auto, on_ask }: SendProps) {
   const { store } = session;
   const robot = store.selected.value;
-  const needs_confirm = useSignal(false);
+  const to_confirm = useSignal<Sending | null>(null); // that was refused without a confirmation
   const is_confirmed = useSignal(false);
   const robot_id = robot?.robot_id ?? '';
-  const send = (what: string, request: (id: string) => Promise<void>) =>
+  const clear = () => {
+    to_confirm.value = null;
+    is_confirmed.value = false;
+  };
+  const send = (what: Sending, request: (id: string, is_confirmed: boolean) => Promise<void>) =>
     acts.act(what, async () => {
       // SAFETY: nothing is sent by a page that does not see the present, or to a robot that Escape would not stop.
       if (!store.is_current.peek() || robot_id === '' || store.selected_id.peek() !== robot_id) return;
+      on_ask();
+      // SAFETY: a tick confirms what it was asked for: sending this one, or restoring the one before.
+      const is_this_confirmed = to_confirm.peek() === what && is_confirmed.peek();
+      if (!is_this_confirmed) clear();
       try {
-        await request(robot_id);
-        needs_confirm.value = is_confirmed.value = false;
+        await request(robot_id, is_this_confirmed);
+        clear();
       } catch (error) {
-        if (error instanceof ApiError && error.reason === 'confirm_required') needs_confirm.value = true;
+        if (error instanceof ApiError && error.reason === 'confirm_required') to_confirm.value = what;
         throw error;
       }
     });
   const push = () =>
-    send('sending', async (id) => {
-      const pushed = await work.api.push(id, design.controller!, is_confirmed.peek());
+    send('sending', async (id, is_confirmed) => {
+      const pushed = await work.api.push(id, design.controller!, is_confirmed);
       work.pushed.value = { ...pushed, robot_id: id };
       if (!pushed.verified) throw new Error(`${id} has accepted it and not reported it yet. Look at what it reports.`);
     });
   const restore = () =>
-    send('restoring', async (id) => {
-      await work.api.restore(id, is_confirmed.peek());
+    send('restoring', async (id, is_confirmed) => {
+      await work.api.restore(id, is_confirmed);
       work.pushed.value = null;
     });
   const blocked = !store.is_current.value
@@ -241,7 +264,7 @@ function Send({ session, work, design, acts, is_auto }: SendProps) {
             : '';
   return (
     <div class="design-send">
-      {needs_confirm.value && (
+      {to_confirm.value && (
         <label class="tick">
           <input
             type="checkbox"
@@ -250,7 +273,10 @@ function Send({ session, work, design, acts, is_auto }: SendProps) {
             checked={is_confirmed.value}
             onChange={(event) => (is_confirmed.value = event.currentTarget.checked)}
           />
-          <span>It may use more duty than the controller in force. I confirm that.</span>
+          <span>
+            {to_confirm.value === 'sending' ? 'It' : 'The one before'} may use more duty than the controller in force. I
+            confirm that.
+          </span>
         </label>
       )}
       <button

@@ -10,7 +10,7 @@ import { Graph, path_of, type Axis, type GraphPoint } from './graph';
 import { closed_loop, modes_of, type Response } from './time_response';
 import { fixed_text } from './words';
 
-interface Curve {
+export interface Curve {
   predicted: Predicted;
   response: Response;
 }

@@ -4,7 +4,6 @@ import { useEffect, useMemo } from 'preact/hooks';
 import { Choice } from '../../parts/choice';
 import type { Fluid } from '../../api';
 import { fluid_text } from '../../format';
-import { useAsked } from '../experiments/acts';
 import { kCrossover, change_design, with_plant, type Design } from './address';
 import { Ask, specification_of, useAskMoves, with_specification } from './ask';
 import { plant_of, type ControllerInForce, type StoredDesign, type Tuned } from './design_api';
@@ -52,7 +51,7 @@ const plant_of_fluid = (fluids: readonly Fluid[], name: string): Plant | null =>
 };
 
 export function TuneStep(props: StepProps) {
-  const { session, work, design, model } = props;
+  const { session, work, design, model, tune, in_force } = props;
   const is_live = session.phase.value === 'live';
   const fluids = session.fluids.value ?? [];
   const plant = useMemo(() => {
@@ -60,31 +59,19 @@ export function TuneStep(props: StepProps) {
     if (design.fluid !== '') return plant_of_fluid(fluids, design.fluid);
     return design.paper === '' ? null : kPaperPlants[design.paper];
   }, [design.model, design.fluid, design.paper, model, fluids]);
-  const robot_id = session.store.selected_id.value ?? '';
-  const checksum = session.store.selected.value?.state.value.controller_checksum;
-  const in_force = useAsked(
-    session,
-    async () => ({ robot_id, found: robot_id === '' ? null : await work.api.in_force(robot_id).catch(() => null) }),
-    [robot_id, checksum],
-  );
-  const is_read = in_force.answer?.robot_id === robot_id;
-  const body = tune_body(design, is_read ? (in_force.answer?.found?.controller ?? null) : null);
-  const key = body === null ? '' : JSON.stringify(body);
   const map_body = map_body_of(design);
   const map_key = JSON.stringify(map_body);
   // The loop first; the map takes longer and changes with the plant alone.
   useEffect(() => {
-    if (!is_live || !is_read || body === null || plant === null || !may_record(session)) return;
-    work.tuning.ask(key, body);
+    if (!is_live || !in_force.is_read || tune === null || plant === null || !may_record(session)) return;
+    work.tuning.ask(tune.key, tune.body);
     if (map_body) work.map.ask(map_key, map_body);
-  }, [is_live, is_read, key, map_key, plant === null, session.me.value]);
+  }, [is_live, in_force.is_read, tune?.key, map_key, plant === null, session.me.value]);
 
   const move = useAskMoves(work, design);
   const dragged = work.dragged.value;
   const asked = dragged ?? specification_of(design);
-  const answer = work.tuning.answer.value;
-  const is_answered = dragged === null && answer.key === key && answer.phase === 'done';
-  const tuned = is_answered ? answer.result : null;
+  const tuned = dragged === null ? (work.tuning.answer_to(tune?.key)?.result ?? null) : null;
   const own = useMemo(
     () => (plant ? solve(plant, asked) : null),
     [plant, asked.crossover_rad_s, asked.phase_margin_deg],
@@ -93,14 +80,7 @@ export function TuneStep(props: StepProps) {
   const law = near ?? (tuned?.feasible ? tuned : (own?.law ?? null));
   const map = work.map.answer.value;
   return (
-    <Step
-      work={work}
-      number={3}
-      name="tune"
-      title="Tune a controller"
-      state={tune_state(props, plant, key)}
-      share={null}
-    >
+    <Step work={work} number={3} name="tune" title="Tune a controller" state={tune_state(props, plant)} share={null}>
       <div class="design-tune-top">
         <div>
           <PlantList {...props} fluids={fluids} />
@@ -149,21 +129,17 @@ function map_body_of(design: Design): JobBody | null {
     : null;
 }
 
-function tune_state({ session, work, design, model }: StepProps, plant: Plant | null, key: string) {
-  const answer = work.tuning.answer.value;
+function tune_state({ session, work, design, model, tune }: StepProps, plant: Plant | null) {
+  const answer = work.tuning.answer_to(tune?.key);
   if (plant_choice(design) === null) return { kind: 'needs', text: 'needs a model' } as const;
   if (typeof model === 'string' && design.model !== null) return { kind: 'failed', text: `failed: ${model}` } as const;
   if (plant === null && design.fluid !== '' && session.fluids.value !== null)
     return { kind: 'failed', text: `${fluid_text(design.fluid)} has no model with a plant` } as const;
   if (!may_record(session)) return { kind: 'needs', text: 'needs the role operator' } as const;
   if (work.dragged.value !== null) return { kind: 'running', text: 'asked when the slider rests' } as const;
-  const state = state_of(answer.key === key ? answer : { ...answer, phase: 'asking' }, {
-    kind: 'running',
-    text: 'asking',
-  });
-  if (state.kind === 'done' && answer.result && !answer.result.feasible)
-    return { kind: 'failed', text: 'not feasible' } as const;
-  return state;
+  if (answer === null) return { kind: 'running', text: 'asking' } as const;
+  const state = state_of(answer, { kind: 'running', text: 'asking' });
+  return answer.result?.feasible === false ? ({ kind: 'failed', text: 'not feasible' } as const) : state;
 }
 
 function PlantList({ design, designs, model, fluids }: StepProps & { fluids: readonly Fluid[] }) {

@@ -9,9 +9,11 @@ import { change_design } from './address';
 import type { Measures, Predicted, Tuned } from './design_api';
 import type { StepProps } from './parts';
 import { Step } from './step';
+import { VerifyPlots } from './verify_plot';
 import { fixed_text, type StepState } from './words';
 
 const kSameSize = 0.05; // relative
+const kMostPlots = 4;
 
 // The prediction that a measured step belongs to: by its cause and its size, as `rheonaut autotune` does.
 export function predicted_for(
@@ -27,7 +29,7 @@ export function predicted_for(
   return step.cause === 'disturbance' && is_of_size(-disturbance_m) ? predicted.disturbance : null;
 }
 
-export function VerifyStep({ session, work, design, runs }: StepProps) {
+export function VerifyStep({ session, work, design, runs, tune }: StepProps) {
   const robot_id = session.store.selected_id.value ?? '';
   const own = (runs.answer?.runs ?? []).filter(
     (run) => run.state !== 'open' && (run.robot_id === robot_id || run.run_id === design.verified),
@@ -40,7 +42,7 @@ export function VerifyStep({ session, work, design, runs }: StepProps) {
   );
   const found = metrics.answer?.id === design.verified ? (metrics.answer?.found ?? null) : null;
   const run = own.find(({ run_id }) => run_id === design.verified);
-  const tuned = work.tuning.answer.value.phase === 'done' ? work.tuning.answer.value.result : null;
+  const tuned = work.tuning.answer_to(tune?.key)?.result ?? null;
   const checksum = session.store.selected.value?.state.value.controller_checksum;
   const is_other = run !== undefined && run.robot_id === robot_id && run.controller_checksum !== checksum;
   return (
@@ -89,7 +91,7 @@ export function VerifyStep({ session, work, design, runs }: StepProps) {
           ) : found.steps.length === 0 ? (
             <p class="quiet design-empty">Run {design.verified} has no step in auto to compare.</p>
           ) : (
-            <Compared steps={found.steps} tuned={tuned} run_id={design.verified!} />
+            <Compared session={session} work={work} steps={found.steps} tuned={tuned} run_id={design.verified!} />
           )}
         </div>
       </div>
@@ -107,8 +109,18 @@ function verify_state(design: StepProps['design'], robot_id: string, problem: st
   return { kind: 'ready', text: 'ready' };
 }
 
-function Compared({ steps, tuned, run_id }: { steps: StepMeasures[]; tuned: Tuned | null; run_id: number }) {
+interface ComparedProps extends Pick<StepProps, 'session' | 'work'> {
+  steps: StepMeasures[];
+  tuned: Tuned | null;
+  run_id: number;
+}
+
+function Compared({ session, work, steps, tuned, run_id }: ComparedProps) {
   const predicted = tuned?.feasible ? tuned.predicted[0] : undefined;
+  const compared = steps.flatMap((step) => {
+    const of_step = predicted_for(step, predicted);
+    return of_step ? [{ step, predicted: of_step }] : [];
+  });
   return (
     <>
       <div class="design-scroll-x">
@@ -139,6 +151,15 @@ function Compared({ steps, tuned, run_id }: { steps: StepMeasures[]; tuned: Tune
           </tbody>
         </table>
       </div>
+      {tuned?.feasible && (
+        <VerifyPlots
+          session={session}
+          work={work}
+          run_id={run_id}
+          tuned={tuned}
+          compared={compared.slice(0, kMostPlots)}
+        />
+      )}
       <p class="quiet design-note">
         A position by the robot’s own estimate says what the robot believed, not where it was.{' '}
         <a href={format({ view: 'runs', parts: [String(run_id)] })}>Run {run_id} in full</a>

@@ -35,12 +35,13 @@ export function useActs(): Acts {
   return { pending, problem, act };
 }
 
-// What is asked for when it is first shown, each time the page is live again, and every so often.
+// What is asked for when it is first shown, each time the page is live again, and so long after each answer: one look at a
+// time, so that no older answer comes after a newer one. `every_ms` may depend on the answer; 0: not again.
 export function useAsked<Answer>(
   session: Session,
   ask: () => Promise<Answer>,
   depends_on: readonly unknown[],
-  every_ms = 0,
+  every_ms: number | ((answer: Answer | null) => number) = 0,
 ): { answer: Answer | null; problem: string; ask_again: () => void } {
   const found = useSignal<{ answer: Answer | null; problem: string }>({ answer: null, problem: '' });
   const asked_again = useSignal(0);
@@ -48,19 +49,23 @@ export function useAsked<Answer>(
   useEffect(() => {
     if (!is_live) return;
     let is_wanted = true;
+    let timer: ReturnType<typeof setTimeout> | undefined;
     const look = async () => {
+      let next: { answer: Answer | null; problem: string };
       try {
-        const answer = await ask();
-        if (is_wanted) found.value = { answer, problem: '' };
+        next = { answer: await ask(), problem: '' };
       } catch (error) {
-        if (is_wanted) found.value = { answer: found.peek().answer, problem: refusal(error) };
+        next = { answer: found.peek().answer, problem: refusal(error) };
       }
+      if (!is_wanted) return;
+      found.value = next;
+      const again_ms = typeof every_ms === 'number' ? every_ms : every_ms(next.answer);
+      if (again_ms > 0) timer = setTimeout(() => void look(), again_ms);
     };
     void look();
-    const timer = every_ms > 0 ? setInterval(() => void look(), every_ms) : 0;
     return () => {
       is_wanted = false;
-      clearInterval(timer);
+      clearTimeout(timer);
     };
   }, [is_live, asked_again.value, ...depends_on]);
   return { ...found.value, ask_again: () => (asked_again.value += 1) };

@@ -86,6 +86,15 @@ function OneRun({ session, page, api, route }: Props & { page: RunPage }) {
             Replay
           </a>
         )}
+        {run.state !== 'discarded' && run.state !== 'open' && (
+          <a
+            class="button replay-link"
+            id="run-to-design"
+            href={format({ view: 'design', query: { runs: `${run.run_id}` } })}
+          >
+            Identify a model from it
+          </a>
+        )}
       </section>
       <main class="view-body run-view" aria-label={`Run ${run.run_id}`}>
         {run.state === 'discarded' ? (

@@ -146,16 +146,28 @@ function NewUser({ context, act, acts, is_edited }: NewUserProps) {
       </form>
       <Problem id="station-user-problem" text={wrong.value || (is_edited ? '' : acts.problem.value)} />
       {added.value && (
-        <div class="station-secret" id="station-user-added" role="status">
-          <h2>{added.value.name} may sign in</h2>
-          <p>Tell them the password. It is shown only now.</p>
-          <Copyable id="station-new-password" label="the password" text={added.value.password} is_secret />
-          <button type="button" onClick={() => (added.value = null)}>
-            Done
-          </button>
-        </div>
+        <Password
+          id="station-user-added"
+          code_id="station-new-password"
+          title={`${added.value.name} may sign in`}
+          text={added.value.password}
+          on_done={() => (added.value = null)}
+        />
       )}
     </>
+  );
+}
+
+function Password(props: { id: string; code_id: string; title: string; text: string; on_done(): void }) {
+  return (
+    <div class="station-secret" id={props.id} role="status">
+      <h2>{props.title}</h2>
+      <p>Tell them the password. It is shown only now.</p>
+      <Copyable id={props.code_id} label="the password" text={props.text} is_secret />
+      <button type="button" onClick={props.on_done}>
+        Done
+      </button>
+    </div>
   );
 }
 
@@ -223,9 +235,22 @@ function Edit({ user, context, act, acts, on_done }: EditProps) {
   const wrong = useSignal('');
   const is_new_role = role.value !== user.role;
   const is_off = acts.pending.value !== '' || !is_current;
+  const saved = useSignal(''); // password, to be told
   const change = async (what: UserChange) => {
-    if (await act('change', () => api.change_user(name, what))) on_done();
+    if (!(await act('change', () => api.change_user(name, what)))) return;
+    if (what.password === undefined) on_done();
+    else saved.value = what.password;
   };
+  if (saved.value !== '')
+    return (
+      <Password
+        id="station-user-changed"
+        code_id="station-changed-password"
+        title={`${name} has a new password`}
+        text={saved.value}
+        on_done={on_done}
+      />
+    );
   const save = () => {
     wrong.value = password.value === '' ? '' : password_problem(password.value);
     if (wrong.value) return;
@@ -273,7 +298,9 @@ function Edit({ user, context, act, acts, on_done }: EditProps) {
       </button>
       <p class="station-note">
         {password.value !== ''
-          ? `A new password signs ${name} out everywhere. Tell it to them: it is not shown again.`
+          ? session.me.value?.user === name
+            ? 'A new password signs you out everywhere, on this page too. Keep it before you save: it is not shown again.'
+            : `A new password signs ${name} out everywhere. It is shown once more when it is saved.`
           : is_new_role
             ? `Open pages of ${name} come back with the new role.`
             : 'Choose another role, or write a new password.'}

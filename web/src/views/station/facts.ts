@@ -1,10 +1,11 @@
 // What several sections show: the station, its recording and its figures, asked for again and again.
 
 import { useComputed } from '@preact/signals';
+import { useEffect } from 'preact/hooks';
 import type { Recording, Station } from '../../api';
 import { plot_settings } from '../../plots/strips';
 import type { Session } from '../../session';
-import { useAsked } from '../experiments/acts';
+import { refusal, useAsked } from '../experiments/acts';
 import { judge, type Fleet, type HealthLine } from './health';
 import type { Metrics } from './metrics';
 import { PaceMeter, type Pace } from './pace';
@@ -14,9 +15,11 @@ export interface Facts {
   station: Station;
   recording: Recording;
   metrics: Metrics | null;
+  metrics_problem: string; // why there are none
   pace: Pace | null;
   clock_off_ms: number; // the station's clock less this machine's
   asked_at_ms: number; // UTC
+  began_ms: number; // the same moment, by this page
 }
 
 // What each section is given.
@@ -37,26 +40,35 @@ const meter = new PaceMeter(); // goes on counting when the view is opened again
 export function useFacts(session: Session, api: StationApi): { facts: Facts | null; problem: string } {
   const ask = async (): Promise<Facts> => {
     const [began_ms, asked_at_ms] = [performance.now(), Date.now()];
+    let metrics_problem = '';
     const [station, recording, metrics] = await Promise.all([
       session.api
         .station()
         .then((answer) => ({ answer, halfway_ms: asked_at_ms + (performance.now() - began_ms) / 2 })),
       session.api.recording(),
-      api.metrics().catch(() => null),
+      api.metrics().catch((error: unknown) => {
+        metrics_problem = refusal(error);
+        return null;
+      }),
     ]);
-    session.station.value = station.answer;
-    session.recording.value = recording;
     meter.note(performance.now() / 1000, recording.counters);
     return {
       station: station.answer,
       recording,
       metrics,
+      metrics_problem,
       pace: meter.pace(),
       clock_off_ms: station.answer.utc_us / 1000 - station.halfway_ms,
       asked_at_ms,
+      began_ms,
     };
   };
   const { answer, problem } = useAsked(session, ask, [], kLook_ms);
+  useEffect(() => {
+    if (!answer) return;
+    session.station.value = answer.station;
+    session.take_recording(answer.recording, answer.began_ms);
+  }, [answer]);
   return { facts: answer, problem };
 }
 
@@ -89,6 +101,7 @@ export function useHealth({ session, facts, is_current }: Context): HealthLine[]
     station: facts?.station ?? null,
     recording: facts?.recording ?? null,
     metrics: facts?.metrics ?? null,
+    metrics_problem: facts?.metrics_problem ?? '',
     pace: facts?.pace ?? null,
     fleet,
     is_page_measured: is_measured,

@@ -33,6 +33,7 @@ export interface HealthInput {
   station: Station | null;
   recording: Recording | null;
   metrics: Metrics | null;
+  metrics_problem: string; // why there are none
   pace: Pace | null;
   fleet: Fleet;
   is_page_measured: boolean; // the way from this page to the station
@@ -61,7 +62,8 @@ export function judge(input: HealthInput): HealthLine[] {
 }
 
 function all_lines(input: HealthInput): HealthLine[] {
-  const { recording, station, metrics, fleet, pace } = input;
+  const { recording, station, metrics, metrics_problem, fleet, pace } = input;
+  const no_figures = metrics_problem === '' ? kNotKnown : line('unknown', '', `Not read: ${metrics_problem}`);
   const of = (group: HealthLine['group'], name: string, title: string, said: Line): HealthLine => ({
     group,
     name,
@@ -80,9 +82,9 @@ function all_lines(input: HealthInput): HealthLine[] {
     of('Robots and stop', 'robots', 'Robots', robots_line(fleet)),
     of('Robots and stop', 'links', 'Links to the robots', links_line(fleet)),
     of('Robots and stop', 'stop', 'Way of a stop', stop_line(fleet, input.is_page_measured)),
-    of('Robots and stop', 'stops', 'Stops until now', metrics ? stops_line(metrics) : kNotKnown),
-    of('Station', 'faults', 'Faults inside', metrics ? faults_line(metrics) : kNotKnown),
-    of('Station', 'connections', 'Connections', metrics ? connections_line(metrics) : kNotKnown),
+    of('Robots and stop', 'stops', 'Stops until now', metrics ? stops_line(metrics) : no_figures),
+    of('Station', 'faults', 'Faults inside', metrics ? faults_line(metrics) : no_figures),
+    of('Station', 'connections', 'Connections', metrics ? connections_line(metrics) : no_figures),
     of('Station', 'security', 'Encryption', station ? security_line(station, input.now_ms) : kNotKnown),
     of('Station', 'clock', 'Clock', clock_line(input.clock_off_ms)),
   ];
@@ -307,4 +309,14 @@ export function summary_of(lines: readonly HealthLine[]): { word: Word; text: st
       ? `${count(bad)} bad${off.length > bad ? `, ${count(off.length - bad)} to look at` : ''}`
       : `${count(off.length)} to look at`;
   return { word: bad > 0 ? 'bad' : 'caution', text, off };
+}
+
+// SAFETY: says that nothing is to be done only of what is known.
+export function lead_of(lines: readonly HealthLine[]): string {
+  const { word, off } = summary_of(lines);
+  const titles = (of: readonly HealthLine[]) => of.map(({ title }) => title).join(', ');
+  const unknown = lines.filter((line) => line.word === 'unknown');
+  const not_known = unknown.length > 0 ? ` Not known: ${titles(unknown)}.` : '';
+  if (word === 'good') return 'Nothing needs you. Each line is judged again every five seconds.';
+  return (off.length > 0 ? `Look at: ${titles(off)}.${not_known}` : `What is known is well.${not_known}`).trim();
 }

@@ -3,7 +3,7 @@
 import { GuardedButton } from '../../parts/hold_button';
 import { useActs } from '../experiments/acts';
 import { useHealth, type Context } from './facts';
-import { summary_of } from './health';
+import { lead_of } from './health';
 import { exact_text, moment_text } from './moments';
 import { Panel, Problem, WordMark } from './parts';
 
@@ -12,7 +12,6 @@ const kGroups = ['Recording', 'Robots and stop', 'Station'] as const;
 export function HealthView({ context }: { context: Context }) {
   const lines = useHealth(context);
   const { facts, is_current, is_utc } = context;
-  const { off } = summary_of(lines);
   const as_of = facts ? moment_text(facts.asked_at_ms * 1000, is_utc, true).slice(11) : '';
   return (
     <div id="station-health" class={is_current ? '' : 'was'}>
@@ -21,9 +20,7 @@ export function HealthView({ context }: { context: Context }) {
           ? 'Asking the station…'
           : !is_current
             ? `What was so at ${as_of}. Nothing is known of now.`
-            : off.length === 0
-              ? 'Nothing needs you. Each line is judged again every five seconds.'
-              : `Look at: ${off.map(({ title }) => title).join(', ')}.`}
+            : lead_of(lines)}
       </p>
       <Losses context={context} />
       <div class="station-health">

@@ -46,6 +46,12 @@ export class PaceMeter {
 
 export const bytes_per_day = (pace: Pace) => pace.samples_per_s * kBytesOfSample * 86_400;
 
+// The database is never so large that the disk is full: it is kept below a limit that fits on the disk and can be kept.
+export const is_within_disk = ({ retention, database_bytes, free_bytes }: Recording): boolean =>
+  retention.max_database_bytes > 0 &&
+  !retention.all_held &&
+  retention.max_database_bytes - database_bytes <= free_bytes;
+
 // Until the disk is full at this pace; null: nothing arrives.
 export function full_in_s(pace: Pace, free_bytes: number): number | null {
   const growth_per_s = pace.samples_per_s * kBytesOfSample;

@@ -4,7 +4,7 @@ import { bytes, count } from '../../format';
 import { format } from '../../route';
 import type { Context } from './facts';
 import { span_text } from './moments';
-import { bytes_per_day, full_in_s, kBytesOfSample } from './pace';
+import { bytes_per_day, full_in_s, is_within_disk, kBytesOfSample } from './pace';
 import { Copyable, Fact, Nothing, Panel, Problem } from './parts';
 
 export function Storage({ context }: { context: Context }) {
@@ -29,7 +29,13 @@ export function Storage({ context }: { context: Context }) {
           {!pace ? 'measuring…' : pace.samples_per_s === 0 ? 'nothing' : `${bytes(bytes_per_day(pace))} a day`}
         </Fact>
         <Fact name="Disk full in about">
-          {is_bounded ? 'never' : !pace ? 'measuring…' : full_s === null ? 'no samples come' : span_text(full_s)}
+          {is_within_disk(recording)
+            ? 'never'
+            : !pace
+              ? 'measuring…'
+              : full_s === null
+                ? 'no samples come'
+                : span_text(full_s)}
         </Fact>
       </dl>
       <p class="station-lead quiet">
