@@ -149,8 +149,8 @@ export class Api {
   robot_events = async (robot_id: string) =>
     (await this.ask<{ events: EventRecord[] }>('GET', past(robot_id, 'events', { limit: 1000 }))).events;
   // The newest 1000, but for renewals of leases: there are ten a second while a motor runs.
-  robot_commands = async (robot_id: string) => {
-    const path = past(robot_id, 'commands', { limit: 1000, renewals: 'false' });
+  robot_commands = async (robot_id: string, within: Record<string, number> = {}) => {
+    const path = past(robot_id, 'commands', { ...within, limit: 1000, renewals: 'false' });
     return (await this.ask<{ commands: CommandRecord[] }>('GET', path)).commands;
   };
   robot_markers = async (robot_id: string, after: number) =>

@@ -2,7 +2,9 @@
 
 import { expect, test } from 'vitest';
 import { asked, grid_us, parse_comparison } from '../../src/views/runs/alignment';
+import { time_of } from '../../src/views/runs/runs_api';
 import { clock_label, since_text, time_splits, time_step_s } from '../../src/views/runs/time_axis';
+import { made_run } from './made';
 import { around, inside, moved, parse_window, window_query, zoomed } from '../../src/views/runs/windows';
 
 const bounds = { from_us: 0, to_us: 100_000_000 };
@@ -95,4 +97,10 @@ test('a grid is as fine as can be drawn, in whole samples', () => {
   expect(grid_us(5, 1000)).toBe(10_000);
   expect(grid_us(42, 1000)).toBe(50_000);
   expect(grid_us(1e9, 1000)).toBe(60_000_000);
+});
+
+test('what happened is asked for from the start of a run, and past its end for what was received late', () => {
+  const run = made_run({ started_at_us: 1_000_000, ended_at_us: 3_000_000 });
+  expect(time_of(run)).toEqual({ from_us: 1_000_000, to_us: 603_000_000 });
+  expect(time_of({ ...run, ended_at_us: null })).toEqual({ from_us: 1_000_000 });
 });

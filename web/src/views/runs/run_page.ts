@@ -89,10 +89,10 @@ export class RunPage {
   }
 
   async load_what_happened(): Promise<void> {
-    const { robot_id } = this.run.peek() as Run;
+    const run = this.run.peek() as Run;
     const asked = await Promise.allSettled([
       this.api.markers(this.run_id).then((markers) => (this.markers.value = markers)),
-      this.api.events(robot_id).then((events) => (this.events.value = events)),
+      this.api.events(run).then((events) => (this.events.value = events)),
     ]);
     const failed = asked.find((each) => each.status === 'rejected');
     this.unread.value = failed ? said(failed.reason) : '';

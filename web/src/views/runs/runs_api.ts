@@ -45,6 +45,14 @@ export function query(members: Record<string, string | number | null | undefined
   return new URLSearchParams(said.map(([name, value]) => [name, String(value)])).toString();
 }
 
+// From the start of a run to some time after its end: what happened during an outage of the link is received later.
+const kLate_us = 600_000_000;
+export function time_of(run: Run): { from_us: number; to_us?: number } {
+  return run.ended_at_us === null
+    ? { from_us: run.started_at_us }
+    : { from_us: run.started_at_us, to_us: run.ended_at_us + kLate_us };
+}
+
 export class RunsApi {
   constructor(private readonly api: Pick<Api, 'read' | 'change'>) {}
 
@@ -66,10 +74,11 @@ export class RunsApi {
     }
     return found;
   };
-  // The newest of the robot; those of an old run may be out of reach.
-  events = async (robot_id: string) =>
-    (await this.api.read<{ events: EventRecord[] }>(`/robots/${encodeURIComponent(robot_id)}/events?limit=1000`))
-      .events;
+  // In the time of the run; of more than 1000 the newest.
+  events = async (run: Run) => {
+    const path = `/robots/${encodeURIComponent(run.robot_id)}/events?${query({ ...time_of(run), limit: 1000 })}`;
+    return (await this.api.read<{ events: EventRecord[] }>(path)).events;
+  };
   overview = (run_id: number, window: Window | null, points: number, signal?: AbortSignal) =>
     this.api.read<Overview>(`/runs/${run_id}/overview?${query({ ...window, points })}`, signal);
   // The first sample of the robot at or after a moment; null where there is none.

@@ -297,6 +297,6 @@ function useWhatHappened(
   const oldest_us = events.length === 1000 ? Math.min(...events.map((event) => event.received_at_us)) : 0;
   const events_out = oldest_us > extent.first_us;
   const what = [events_out && 'events', commands_out && 'commands'].filter(Boolean).join(' and ');
-  const out_of_reach = what ? `The station lists the newest 1000 ${what} of a robot: some of this run are older.` : '';
+  const out_of_reach = what ? `The newest 1000 ${what} of this run are listed; there are earlier ones.` : '';
   return { gaps_s, out_of_reach, problems };
 }

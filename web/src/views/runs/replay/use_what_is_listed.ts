@@ -5,7 +5,7 @@ import { useEffect } from 'preact/hooks';
 import type { CommandRecord } from '../../../api';
 import type { Session } from '../../../session';
 import { said, type RunPage } from '../run_page';
-import type { Losses, Run } from '../runs_api';
+import { time_of, type Losses, type Run } from '../runs_api';
 
 const kListed = 1000; // the newest
 const kAgain_ms = 5000; // after a request that failed
@@ -48,7 +48,10 @@ export function useRead<Answer>(
 const kNone: readonly CommandRecord[] = [];
 
 export function useCommands(session: Session, run: Run) {
-  const { answer, problem } = useRead(session, () => session.api.robot_commands(run.robot_id), [run.run_id, run.state]);
+  const { answer, problem } = useRead(session, () => session.api.robot_commands(run.robot_id, time_of(run)), [
+    run.run_id,
+    run.state,
+  ]);
   const commands: readonly CommandRecord[] = answer ?? kNone;
   const oldest_us = commands.at(-1)?.submitted_at_us ?? 0;
   return { commands, problem, out_of_reach: commands.length >= kListed && oldest_us > run.started_at_us };
