@@ -1,15 +1,13 @@
 // Drives the cockpit in a real browser, from the login link to a station that was killed and came back.
 //
-//   cockpit_test.mjs [--screenshot PATH] [--pictures FOLDER]
+//   cockpit_test.mjs [--pictures FOLDER]
 //
-// PATH gets a picture of the cockpit in the closed-loop experiment, FOLDER some of signing in.
+// FOLDER gets pictures of signing in.
 import assert from 'node:assert/strict';
 import { join } from 'node:path';
 import { Bench, clear_latch as hold_to_clear, run, until } from './programs.mjs';
 
 const kRobot = 'rheo-1';
-const at = process.argv.indexOf('--screenshot');
-const screenshot = at > 0 ? process.argv[at + 1] : null;
 const pictures_at = process.argv.indexOf('--pictures');
 const pictures = pictures_at > 0 ? process.argv[pictures_at + 1] : null;
 const bench = new Bench();
@@ -106,25 +104,6 @@ const steps = {
       return new Set(Uint32Array.from(new Uint32Array(pixels.buffer))).size;
     });
     assert.ok(drawn > 10, 'the plot has traces');
-  },
-
-  async 'a picture, when asked for'() {
-    if (!screenshot) return;
-    await page.fill('#run-name', 'closed loop, 100 mm');
-    await page.click('#start-run');
-    await page.locator('#end-run').waitFor();
-    const first = (await robot()).next_seq;
-    for (const [setpoint_mm, seconds] of [[60, 12], [150, 14], [100, 12]]) {
-      await page.fill('#setpoint-entry', String(setpoint_mm));
-      await page.press('#setpoint-entry', 'Enter');
-      const until_seq = (await robot()).next_seq + seconds * 100;
-      await until('the experiment goes on', async () => (await robot()).next_seq >= until_seq);
-    }
-    assert.ok((await robot()).next_seq > first);
-    await page.mouse.move(5, 5);
-    await page.evaluate(() => document.activeElement.blur());
-    await page.screenshot({ path: screenshot });
-    await page.click('#end-run');
   },
 
   async 'Escape stops, also from inside a field; the time is shown'() {

@@ -1,7 +1,7 @@
 // How a line of the log reads, and which ones stand out.
 import { expect, test } from 'vitest';
 import type { EventRecord } from '../src/api';
-import { describe } from '../src/parts/log_strip';
+import { arguments_text, describe } from '../src/parts/log_strip';
 
 const line = (event: Partial<EventRecord>, position_sd_m: number | null = null) =>
   describe({
@@ -31,4 +31,11 @@ test('a position has a ±, or the line says that it is not known', () => {
   );
   expect(line({ kind: 'time_step', position_m: 0.1 })[2]).toContain('controller at 100.0 mm, ± not known');
   expect(line({ kind: 'position_zeroed', position_m: 0 })[2]).toMatch(/controller at 0.0 mm$/);
+});
+
+test('the arguments of a command have their units, and a timed one says when, at the end', () => {
+  expect(arguments_text({ execute_at_robot_us: 7_370_637, mode: 'auto', setpoint_m: 0.1 })).toBe(
+    ' auto 100.0 mm at 7.371 s of the robot’s clock',
+  );
+  expect(arguments_text({ duty: 0.3 })).toBe(' 30.0 %');
 });

@@ -52,7 +52,7 @@ function RecordingFigures({ robot, is_current }: { robot: Robot; is_current: boo
   const open = useSignal(false);
   const state = robot.state.value;
   const { received, missing } = robot.readout.value;
-  const line = recording_line(state, missing, is_current);
+  const line = recording_line(state, is_current);
   const lost = state.status?.lost_samples ?? 0;
   const lag = Math.max(0, state.next_seq - state.durable_next_seq);
   return (

@@ -75,12 +75,14 @@ export function describe({ event, command, note, position_sd_m }: LogLine): [ton
   return ['quiet', 'page', note ?? ''];
 }
 
-export function arguments_text(values: Record<string, unknown>): string {
-  return Object.entries(values)
+export function arguments_text({ execute_at_robot_us: at_us, ...values }: Record<string, unknown>): string {
+  const at = at_us === undefined ? '' : ` at ${(Number(at_us) / 1e6).toFixed(3)} s of the robot’s clock`;
+  const others = Object.entries(values)
     .map(([name, value]) => {
       if (typeof value === 'number' && name.endsWith('_m')) return ` ${millimetres(value)} mm`;
       if (typeof value === 'number' && name === 'duty') return ` ${percent(value)} %`;
       return name === 'emergency_id' ? ` …${String(value).slice(-6)}` : ` ${String(value)}`;
     })
     .join('');
+  return others + at;
 }
