@@ -55,7 +55,8 @@ class Camera {
       this.frames.push({ file, at_s: metadata.timestamp });
       void this.session.send('Page.screencastFrameAck', { sessionId }).catch(() => undefined);
     });
-    await this.session.send('Page.startScreencast', { format: 'png', everyNthFrame: 1 });
+    // Each is encoded while the robot swims: all of them would make it miss ticks on a small machine.
+    await this.session.send('Page.startScreencast', { format: 'png', everyNthFrame: 3 });
   }
 
   async end() {
