@@ -8,8 +8,8 @@ import { execFileSync } from 'node:child_process';
 import { mkdtempSync, rmSync, statSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
-import { Bench, until } from '../tests/browser/programs.mjs';
-import { confirm_model, hold_to_manual } from './page_scenes.mjs';
+import { Bench, clear_latch, until } from '../tests/browser/programs.mjs';
+import { confirm_model } from './page_scenes.mjs';
 
 const kRobot = 'rheo-1';
 const kSize = { width: 1280, height: 900 };
@@ -21,20 +21,22 @@ const out = process.argv[2];
 // ---- what is drawn over the page
 
 function add_pointer_and_text(text_px) {
-  const add = (style) => Object.assign(document.body.appendChild(document.createElement('div')).style, style);
+  const add = (style) => {
+    const element = document.body.appendChild(document.createElement('div'));
+    Object.assign(element.style, style);
+    return element;
+  };
   const over_all = { position: 'fixed', zIndex: '99999', pointerEvents: 'none' };
   const line = add({ ...over_all, left: '0', right: '0', bottom: '0', height: `${text_px}px`, background: '#f0f4f8',
                      color: '#10161a', font: `600 17px/${text_px}px B612, sans-serif`, textAlign: 'center' });
-  const text = document.body.lastElementChild;
   const pointer = add({ ...over_all, left: '0', top: '0', width: '22px', height: '22px', borderRadius: '50%',
                         border: '3px solid #ffd23f', boxShadow: '0 0 0 1px #0008', transform: 'translate(-99px, -99px)' });
   window.addEventListener('pointermove', (event) => {
-    pointer.transform = `translate(${event.clientX - 14}px, ${event.clientY - 14}px)`;
+    pointer.style.transform = `translate(${event.clientX - 14}px, ${event.clientY - 14}px)`;
   }, true);
-  window.addEventListener('pointerdown', () => (pointer.background = '#ffd23f'), true);
-  window.addEventListener('pointerup', () => (pointer.background = 'none'), true);
-  window.film_says = (words) => (text.textContent = words);
-  return line;
+  window.addEventListener('pointerdown', () => (pointer.style.background = '#ffd23f'), true);
+  window.addEventListener('pointerup', () => (pointer.style.background = 'none'), true);
+  window.film_says = (words) => (line.textContent = words);
 }
 
 // ---- the frames
@@ -125,7 +127,7 @@ async function play(page, bench) {
   await page.locator('#stop-line[data-phase=stopped]').waitFor();
   await pause(2.5);
   await says('To clear it, hold the button: nothing moves by itself.');
-  await hold_to_manual(page);
+  await clear_latch(page);
   await pause(0.5);
   await send_setpoint(100);
   await pause(1.5);

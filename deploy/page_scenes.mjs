@@ -1,7 +1,7 @@
 // What the film and the pictures of the page have in common.
 import { execFileSync } from 'node:child_process';
 import { join } from 'node:path';
-import { bin, clear_latch, until } from '../tests/browser/programs.mjs';
+import { bin, until } from '../tests/browser/programs.mjs';
 
 // The robot gets the model of its fluid and confirms it: its position is then as certain as the sensor allows.
 export async function confirm_model(bench, robot_id, fluid) {
@@ -10,5 +10,3 @@ export async function confirm_model(bench, robot_id, fluid) {
   await bench.post(`/robots/${robot_id}/fluid`, { fluid });
   await until('the robot confirms its model', async () => (await bench.ask(`/robots/${robot_id}`)).model.state === 'confirmed');
 }
-
-export { clear_latch as hold_to_manual };

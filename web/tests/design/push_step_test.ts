@@ -1,4 +1,4 @@
-// What is confirmed for a robot and a controller is sent with these alone, and a failure is told of them alone.
+// What is confirmed for a robot and a controller is sent with these alone, and a failure is shown for them alone.
 import { signal } from '@preact/signals';
 import { h, render } from 'preact';
 import { afterEach, beforeEach, expect, test, vi } from 'vitest';
@@ -136,7 +136,7 @@ test('SAFETY: a tick for sending is none for restoring; with it what it was give
   expect(page.find('design-confirm')).toBeNull();
 });
 
-test('what failed is told of the robot and the controller that it failed with', async () => {
+test('what failed is shown for the robot and the controller that it failed with', async () => {
   const { store, draw, press, state } = drawn();
   await draw({ controller: 8 });
   await press('design-push');

@@ -1,4 +1,4 @@
-// A password that was made for somebody is shown until it has been told.
+// A password that was made for somebody is shown until "Done" is pressed.
 import { signal } from '@preact/signals';
 import { h, render } from 'preact';
 import { afterEach, beforeEach, expect, test, vi } from 'vitest';

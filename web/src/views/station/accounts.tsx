@@ -235,7 +235,7 @@ function Edit({ user, context, act, acts, on_done }: EditProps) {
   const wrong = useSignal('');
   const is_new_role = role.value !== user.role;
   const is_off = acts.pending.value !== '' || !is_current;
-  const saved = useSignal(''); // password, to be told
+  const saved = useSignal(''); // the new password, shown until "Done"
   const change = async (what: UserChange) => {
     if (!(await act('change', () => api.change_user(name, what)))) return;
     if (what.password === undefined) on_done();
