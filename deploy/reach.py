@@ -21,7 +21,8 @@ CPP = (".cpp", ".hpp", ".h", ".ino")
 # What decides how everything is built or tested.
 EVERYTHING = re.compile(r"(CMakeLists\.txt|CMakePresets\.json|cmake/.*|tests/CMakeLists\.txt|deploy/(build|packages|test|"
                         r"reach\.py)|\.ci/.*)$")
-CHECKS = ("rules", "rules_test", "rooms", "docs", "docs_test", "format", "reach_test", "tidy_test")  # seconds; after every change
+CHECKS = ("rules", "rules_test", "rooms", "docs", "docs_test", "docs_messages", "format", "reach_test",
+          "tidy_test")  # seconds; after every change
 LX106 = re.compile(r"(robot_fw|protocol|sim_robot/(world|robot|network|faults|scenario|lab)|control/models|tests/lx106)/|"
                    r"deploy/(lx106|esp8266)")
 BROWSER_ROOM = "server/api/routes"  # embeds the page and openapi.yaml

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""Checks that what the documents point to is there: relative links, paths such as `server/link/robot_session`, code.
+"""Checks that what the documents point to is there: relative links with their anchors, pictures, paths such as
+`server/link/robot_session`, code.
 
 A path in backquotes that begins with one of our folders must be a file or folder, with or without its suffix; `*` and
 `<noun>` match anything. A block of code that names a file, as "```cpp tests/sim_robot/story_examples_test.cpp", must
@@ -7,6 +8,7 @@ stand in that file word for word. The station's own kinds of events are those of
 Every decision has a number of its own and a row in docs/decisions/README.md, which also names the numbers that were never
 given. Prints `file:line: what is missing` and fails if anything is.
 """
+import functools
 import pathlib
 import re
 import sys
@@ -18,6 +20,38 @@ SUFFIXES = ("", ".hpp", ".cpp", ".ts", ".tsx", ".py", ".m")
 def exists(root, path):
     pattern = re.sub(r"<\w+>", "*", path.rstrip("/"))
     return any(any(root.glob(pattern + suffix)) for suffix in SUFFIXES)
+
+
+def without_blocks(text):
+    """The text with its blocks of code blanked out; lines keep their numbers."""
+    return re.sub(r"^```.*?^```$", lambda block: "\n" * block.group(0).count("\n"), text, flags=re.M | re.S)
+
+
+@functools.cache
+def anchors(document):
+    """The anchors of a page's headings, as GitHub and the site make them."""
+    made = []
+    for heading in re.findall(r"^#{1,6} (.+)$", without_blocks(document.read_text(encoding="utf-8")), re.M):
+        words = re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", heading).strip().lower()
+        anchor = re.sub(r"[^\w\- ]", "", words).replace(" ", "-")
+        repeats = sum(re.fullmatch(re.escape(anchor) + r"(-\d+)?", other) is not None for other in made)
+        made.append(f"{anchor}-{repeats}" if repeats else anchor)
+    return set(made)
+
+
+def dead_links(document, text):
+    """(line, what is wrong) of each link and picture of a page."""
+    for number, line in enumerate(without_blocks(text).splitlines(), 1):
+        line = re.sub(r"`[^`]*`", "", line)
+        for target in re.findall(r"\]\(([^)\s]+)\)", line):
+            path, _, anchor = target.partition("#")
+            if re.match(r"\w+:", target):
+                continue
+            page = document.parent / path if path else document
+            if not page.exists():
+                yield number, f"the link to {path} leads nowhere"
+            elif anchor and (page.suffix != ".md" or anchor not in anchors(page.resolve())):
+                yield number, f"{path or 'this page'} has no heading for #{anchor}"
 
 
 def misquotations(root, text):
@@ -75,13 +109,11 @@ def faults(root):
         text = document.read_text(encoding="utf-8")
         name = document.relative_to(root)
         yield from (f"{name}:{line}: {what}" for line, what in misquotations(root, text))
+        yield from (f"{name}:{line}: {what}" for line, what in dead_links(document, text))
         in_block = False
         for number, line in enumerate(text.splitlines(), 1):
             place = f"{name}:{number}"
             in_block ^= line.startswith("```")
-            for target in re.findall(r"\]\(([^)#]+)(?:#[^)]*)?\)", line):
-                if not re.match(r"\w+:", target) and not (document.parent / target).exists():
-                    yield f"{place}: the link to {target} leads nowhere"
             for quoted in [] if in_block else re.findall(r"`([^`]+)`", line):
                 path = quoted.split(" ")[0]
                 if "/" in path and path.split("/")[0] in FOLDERS and not exists(root, path):

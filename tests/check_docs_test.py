@@ -22,6 +22,12 @@ class CheckDocs(unittest.TestCase):
         self.assertEqual(found("\n[a](gone.md)\n"), ["README.md:2: the link to gone.md leads nowhere"])
         self.assertEqual(found("`tests/gone_test`\n"), ["README.md:1: there is no tests/gone_test"])
 
+    def test_anchors(self):
+        self.assertEqual(found("# What next\n\n## Robot's `LED`\n## a\n## a\n[a](#what-next) [b](README.md#robots-led) [c](#a-1)\n"), [])
+        self.assertEqual(found("# One\n```\n# two\n[x](gone.md)\n```\n[a](#two)\n"),
+                         ["README.md:6: this page has no heading for #two"])
+        self.assertEqual(found("[a](tests/a_test.cpp#L3)\n"), ["README.md:1: tests/a_test.cpp has no heading for #L3"])
+
     def test_code_that_names_its_file_stands_there(self):
         self.assertEqual(found("```cpp tests/a_test.cpp\nint one;\nint two;\n```\n"), [])
         self.assertEqual(found("a\n```cpp tests/a_test.cpp\nint one;\nint three;\n```\n"),
