@@ -1,15 +1,24 @@
 #!/usr/bin/env python3
-"""Runs every command line that docs/commands.md and each --help show, and checks the exit status that stands there."""
+"""Runs every command line that docs/commands.md and each --help show, and checks the exit status that stands there; and
+those of the other documents that need neither a station nor what an earlier command of a station has made."""
 import os
 import pathlib
 import re
 import subprocess
+import sys
 import tempfile
 import unittest
 
 ROOT = pathlib.Path(__file__).parents[3]
+sys.path.insert(0, str(ROOT / "tests"))
+
+from check_commands import documents, lines_of_code  # noqa: E402
+
 TOOLS = ("model", "bode", "step", "identify", "estimator", "tune", "discretise", "predict", "profile")
 ACCOUNT_TOOLS = ("user", "token", "robot")
+# What runs by itself, and what of it needs a station or its files all the same.
+ALONE = re.compile(r"rheonaut (profile|tune|predict|user|token|certificate)\b|rheonaut-sim (scenarios|play)\b")
+NOT_ALONE = re.compile(r"--plant |--run |--design |[A-Z]{4}|…|\[")
 
 
 def documented():
@@ -20,9 +29,19 @@ def documented():
             yield line[2:], int(status.group(1)) if status else 0
 
 
-def run(command, folder):
+def alone():
+    """(document, its lines of code blocks that run without a station), in their order."""
+    for name, text in documents(ROOT):
+        lines = text.splitlines()
+        commands = [code for number, code in lines_of_code(text)
+                    if ALONE.match(code) and not NOT_ALONE.search(code.split(" #")[0]) and lines[number - 1].startswith(code[:9])]
+        if name != "docs/commands.md" and commands:
+            yield name, commands
+
+
+def run(command, folder, text=None):
     environment = dict(os.environ, PATH=f"{os.environ['RHEONAUT_BIN']}:{os.environ['PATH']}")
-    return subprocess.run(["bash", "-c", command], cwd=folder, env=environment, capture_output=True, text=True)
+    return subprocess.run(["bash", "-c", command], cwd=folder, env=environment, capture_output=True, text=True, input=text)
 
 
 class DocumentedCommands(unittest.TestCase):
@@ -37,6 +56,16 @@ class DocumentedCommands(unittest.TestCase):
                     self.assertEqual(done.returncode, status, done.stderr)
                     self.assertEqual(done.stderr, "")
                     self.assertTrue(done.stdout or ">" in command)
+
+    def test_commands_of_other_documents_run(self):
+        found = list(alone())
+        self.assertGreaterEqual(len(found), 4)
+        for document, commands in found:
+            with tempfile.TemporaryDirectory() as folder:
+                for command in commands:
+                    with self.subTest(document=document, command=command):
+                        done = run(command, folder, "correct horse battery\n")
+                        self.assertEqual(done.returncode, 0, done.stderr)
 
     def test_examples_of_help_work(self):
         with tempfile.TemporaryDirectory() as folder:
