@@ -25,6 +25,7 @@ CHECKS = ("rules", "rules_test", "rooms", "docs", "docs_test", "docs_messages", 
           "tidy_test")  # seconds; after every change
 LX106 = re.compile(r"(robot_fw|protocol|sim_robot/(world|robot|network|faults|scenario|lab)|control/models|tests/lx106)/|"
                    r"deploy/(lx106|esp8266)")
+DOCUMENT = re.compile(r"[^/]*\.md$|docs/|site/|tests/site/|deploy/(site|npm-packages)$")
 BROWSER_ROOM = "server/api/routes"  # embeds the page and openapi.yaml
 
 
@@ -160,6 +161,8 @@ def reached(root, changed):
         lines.add("program goldens_test")  # it runs both
     if any(LX106.match(path) for path in changed):
         lines |= {"lx106", "test esp8266_check"}
+    if any(DOCUMENT.match(path) for path in changed):
+        lines |= {"test site", "test docs_commands"}
     if any(path.startswith("tests/data/") and not is_named(tree, path) for path in changed):
         lines |= {f"program {program}" for program in tree.programs}
     return sorted(lines)

@@ -13,7 +13,7 @@ import pathlib
 import re
 import sys
 
-FOLDERS = {"protocol", "control", "robot_fw", "sim_robot", "server", "external", "web", "tests", "deploy", "cmake", "docs", "examples"}
+FOLDERS = {"protocol", "control", "robot_fw", "sim_robot", "server", "external", "web", "tests", "deploy", "cmake", "docs", "examples", "site"}
 SUFFIXES = ("", ".hpp", ".cpp", ".ts", ".tsx", ".py", ".m")
 
 

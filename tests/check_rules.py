@@ -9,7 +9,7 @@ import re
 import sys
 
 FOLDERS = ("base", "protocol", "control", "robot_fw", "sim_robot", "server")
-SEARCHED = (*FOLDERS, "external", "web", "tests", "deploy", "cmake", "docs", "examples")
+SEARCHED = (*FOLDERS, "external", "web", "tests", "deploy", "cmake", "docs", "examples", "site")
 SKIPPED = {"node_modules", "dist", "build", "__pycache__", "data", "out"}
 CPP = {".cpp", ".hpp", ".h", ".c", ".ino"}
 SOURCE = CPP | {".py", ".ts", ".tsx", ".css", ".proto", ".sql", ".cmake"}

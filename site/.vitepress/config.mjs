@@ -1,0 +1,75 @@
+// The site of the documents: what stands where in its menus, and how Markdown is read. Made by site/build.mjs.
+import { defineConfig } from 'vitepress';
+
+// As GitHub makes the anchors of headings, so that one link is right in both places; tests/check_docs.py follows them.
+const slugify = (heading) => heading.trim().toLowerCase().replace(/[^\p{L}\p{N}_\- ]/gu, '').replace(/ /g, '-');
+
+const page = (text, name) => ({ text, link: `/docs/${name}` });
+
+const sidebar = [
+  {
+    text: 'Begin',
+    items: [
+      { text: 'Rheonaut', link: '/' },
+      page('All documents', ''),
+      page('Concepts', 'concepts'),
+      page('A first working day', 'tutorial'),
+      page('Questions and answers', 'faq'),
+      page('Troubleshooting', 'troubleshooting'),
+      page('Glossary', 'glossary'),
+    ],
+  },
+  {
+    text: 'Use',
+    items: [
+      page('The page', 'cockpit'),
+      page('Command line', 'commands'),
+      page('Experiments', 'experiments'),
+      page('HTTP and live interface', 'api'),
+      page('Operations', 'operations'),
+      page('Many robots', 'fleet'),
+      page('Simulated robot', 'simulator'),
+      page('Scenarios', 'scenarios'),
+      page('Network faults', 'network_faults'),
+    ],
+  },
+  {
+    text: 'Look up',
+    items: [
+      page('The robot', 'robot'),
+      page('Protocol', 'protocol'),
+      page('Database', 'database'),
+      page('Mathematics', 'control'),
+      page('Reliability', 'reliability'),
+      page('Security', 'security'),
+      page('Performance', 'performance'),
+      page('References', 'references'),
+    ],
+  },
+  {
+    text: 'Change',
+    items: [
+      { text: 'Architecture', link: '/ARCHITECTURE' },
+      { text: 'Contributing', link: '/CONTRIBUTING' },
+      page('Tests as stories', 'test_stories'),
+      page('Decisions', 'decisions/'),
+      { text: 'Changes', link: '/CHANGELOG' },
+    ],
+  },
+];
+
+export default defineConfig({
+  title: 'Rheonaut',
+  description: 'Ground station for a small robot that swims in a non-Newtonian fluid',
+  lang: 'en',
+  base: process.env.SITE_BASE ?? '/',
+  srcDir: 'pages',
+  cacheDir: 'node_modules/.vitepress',
+  markdown: { anchor: { slugify }, languageAlias: { hex: 'ini' } },
+  themeConfig: {
+    search: { provider: 'local' },
+    outline: { level: [2, 3] },
+    sidebar,
+    docFooter: { prev: false, next: false },
+  },
+});
