@@ -6,14 +6,15 @@ for its result. The robot has the model of the fabric softener, which no one has
 """
 import math
 
+from experiment import BAND_M, DISTURBANCE_AT_S, DISTURBANCE_M, SETPOINT_M
 from paper_svg import BLUE, GREY, INK, RED, SETPOINT, Plot, number
 
 STEP = "rheonaut step --duty 0.3 --every-s 0.01 --until-s 7 --csv"
 BODE = "rheonaut bode --from-rad-s 0.1 --to-rad-s 1000 --points 161"
 BODE_OF_POSITION, BODE_OF_VELOCITY = f"{BODE} --csv", f"{BODE} --velocity-loop --csv"
 BODE_AT_65 = "rheonaut bode --from-rad-s 65 --to-rad-s 66 --points 2 --json"
-DISTURBANCE_M, DISTURBANCE_AT_S = -0.05, 20
-TRUE, BELIEVED, TWO_SD = "true", "believed by the robot", "believed ± 2 sd"
+PREDICTED = "rheonaut predict --a 0.5 --csv"
+PREDICTED_IN_WATER = "rheonaut predict --a 0.5 --plant newtonian --csv"
 
 
 def played(scenario):
@@ -45,9 +46,9 @@ def figure_5(programs):
                 "the model (29), and a simulated robot that has only its accelerometer")
     position = plot.panel("position (m)", 230, (0, 8), (-0.03, 0.19))
     t_s = run["t_s"]
-    position.band(t_s, edges(run, -2), edges(run, 2), BLUE, TWO_SD)
+    position.band(t_s, edges(run, -2), edges(run, 2), BLUE, "believed ± 2 sd")
     position.line(t_s, run["position_m"], BLUE, "believed")
-    position.line(t_s, run["true_position_m"], RED, TRUE)
+    position.line(t_s, run["true_position_m"], RED, "true")
     shown = range(0, int(100 * (end_s - start_s)) + 1, 10)
     position.line([start_s + model["t_s"][i] for i in shown], [model["position_m"][i] for i in shown], INK, "model (29)",
                   "5 4")
@@ -90,17 +91,25 @@ def figure_6(programs):
     return plot
 
 
-def closed_loop(programs, scenario, title, subtitle):
-    run = thinned(programs.csv(played(scenario)), [(0, 3), (19.9, 23)])
+def closed_loop(programs, scenario, prediction, title):
+    run, predicted = (thinned(programs.csv(command), [(0, 3), (19.9, 23)]) for command in (played(scenario), prediction))
     t_s, true_m, x = run["t_s"], as_seen(run), (0, 40)
-    plot = Plot(title, subtitle)
-    position = plot.panel("position (m)", 230, x, (-0.01, 0.13))
-    position.line(t_s, run["reference_m"], SETPOINT, "setpoint", "6 4", 1.2)
-    position.line(t_s, run["position_m"], BLUE, BELIEVED)
-    position.line(t_s, true_m, RED, "true, with the disturbance added after 20 s")
+    plot = Plot(title, "to 0.1 m; after 20 s the measured position is shifted by −0.05 m, and so is the true one as drawn here")
+    panels = [plot.panel("position (m)", 200, x, (-0.01, 0.13)),
+              plot.panel("position (m), the step", 150, (0, 3), (0.08, 0.115), part=(0, 0.47)),
+              plot.beside("position (m), disturbance", 150, (20, 23), (0.08, 0.115), part=(0.53, 1))]
+    for panel in panels:
+        named = panel is panels[0]
+        if not named:
+            panel.band([0, 40], [SETPOINT_M - BAND_M] * 2, [SETPOINT_M + BAND_M] * 2, SETPOINT, "± 2 mm")
+        panel.line(t_s, run["reference_m"], SETPOINT, "setpoint" if named else "", "6 4", 1.2)
+        panel.line(t_s, run["position_m"], BLUE, "believed" if named else "")
+        panel.line(t_s, true_m, RED, "true" if named else "")
+        panel.line(predicted["t_s"], predicted["measured_m"], INK, "predicted, with the exact position" if named else "", "2 3",
+                   1.2)
     top = max(2e3 * max(run["position_sd_m"]), 1)
     limit = 10 * math.ceil(top / 10)
-    errors_panel(plot, [(t_s, run, true_m, BLUE, "believed ")], x, (-limit, limit))
+    errors_panel(plot, [(t_s, run, true_m, BLUE, "")], x, (-limit, limit))
     duty = plot.panel("duty", 90, x, (-1.1, 1.1))
     duty.held(t_s, run["duty"], INK)
     plot.x_title("time (s)")
@@ -108,8 +117,7 @@ def closed_loop(programs, scenario, title, subtitle):
 
 
 def figure_7(programs):
-    return closed_loop(programs, "figure_7", "Figure 7: controller (30) in the fabric softener",
-                       "to 0.1 m, and a disturbance of −0.05 m of the measured position after 20 s")
+    return closed_loop(programs, "figure_7", PREDICTED, "Figure 7: controller (30) in the fabric softener")
 
 
 def figure_8(programs):
@@ -135,14 +143,14 @@ def figure_8(programs):
 
 
 def figure_9(programs):
-    return closed_loop(programs, "figure_9", "Figure 9: controller (30) in water",
-                       "to 0.1 m, and a disturbance of −0.05 m of the measured position after 20 s")
+    return closed_loop(programs, "figure_9", PREDICTED_IN_WATER, "Figure 9: controller (30) in water")
 
 
 def figure_a2(programs):
     run = programs.csv(played("figure_a2"))
     every = range(0, len(run["t_s"]), 4)
-    plot = Plot("Figure A2: impedance along the tube", "glucose from 0.20 to 0.30 m, passed at 0.05 m/s; the noise and the offset of the electrode are assumed")
+    plot = Plot("Figure A2: impedance along the tube",
+                "glucose from 0.20 to 0.30 m, passed at 0.05 m/s; the noise and the offset of the electrode are assumed")
     impedance = plot.panel("impedance (mV)", 260, (0, 0.45), (105, 205))
     impedance.level(195, "175 + 20 mV")
     impedance.level(155, "175 − 20 mV: below it the robot stops")
@@ -159,5 +167,5 @@ FIGURES = {"figure_5": figure_5, "figure_6": figure_6, "figure_7": figure_7, "fi
 
 
 def drawn(programs):
-    """{name of the file: SVG text}"""
-    return {f"{name}.svg": draw(programs).svg() for name, draw in FIGURES.items()}
+    """{name: Plot}"""
+    return {name: draw(programs) for name, draw in FIGURES.items()}

@@ -102,8 +102,9 @@ def covered(places):
 
 
 class Page:
-    def __init__(self, programs):
-        self.programs, self.tests, self.values, self.broken, self.count = programs, tests_of_the_project(), {}, [], 0
+    def __init__(self, programs, plots):
+        self.programs, self.plots, self.tests = programs, plots, tests_of_the_project()
+        self.values, self.broken, self.count = {}, [], 0
         missing = NEEDED - covered([place for place, *_ in PLACES])
         if missing:
             raise RuntimeError(f"no entry for {', '.join(sorted(missing))} in PLACES of paper_page.py")
@@ -141,7 +142,7 @@ class Page:
 
     def subject(self, subject):
         lines = [f"## {subject.title}\n", subject.text + "\n"]
-        lines += [f"![{title(name)}](images/paper/{name}.svg)\n" for name in subject.figures]
+        lines += [f"![{self.plots[name].title}](images/paper/{name}.svg)\n" for name in subject.figures]
         lines += ["| row | in the paper | what | printed | ours | deviation | tolerance | holds |", "|---|---|---|---|---|---|---|---|"]
         commands, tests = {}, {}
         for row in subject.rows:
@@ -171,17 +172,14 @@ class Page:
         return "\n".join([BEGIN, "## What does not hold\n" + broken, *subjects, CODE + places])
 
 
-def title(figure):
-    return "Figure " + figure.removeprefix("figure_").upper()
-
-
 def wrapped(text, indent=""):
     return textwrap.fill(text, 120, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False) + "\n"
 
 
 def files(programs):
     """{path from the root: text}"""
-    return {PAGE: Page(programs).text(), **{f"{DRAWINGS}/{name}": text for name, text in drawn(programs).items()}}
+    plots = drawn(programs)
+    return {PAGE: Page(programs, plots).text(), **{f"{DRAWINGS}/{name}.svg": plot.svg() for name, plot in plots.items()}}
 
 
 def main():

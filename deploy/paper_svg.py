@@ -13,7 +13,7 @@ import math
 
 WIDTH, LEFT, RIGHT = 760, 74, 18  # pixels
 TITLE_PX, LEGEND_PX, GAP_PX, X_TITLE_PX = 46, 20, 40, 42
-LETTER_PX = 6.2  # of a legend, on average
+LETTER_PX = 6.9  # of a legend, on average
 INK, GREY, GRID, FRAME = "#1b2a33", "#5b6b73", "#e6ebed", "#8b9aa1"
 BLUE, RED, SETPOINT = "#1f6fb2", "#c8402f", "#6b7a82"
 
@@ -32,15 +32,16 @@ def number(value, decimals):
 
 
 class Panel:
-    def __init__(self, title, top, height, x, y, x_log):
+    def __init__(self, title, top, height, x, y, x_log=False, part=(0, 1)):
         self.title, self.top, self.height, self.x_range, self.y_range, self.x_log = title, top, height, x, y, x_log
+        self.left, self.right = (LEFT + share * (WIDTH - LEFT - RIGHT) for share in part)
         self.parts, self.legend = [], []
 
     def x(self, value):
         low, high = self.x_range
         if self.x_log:
             low, high, value = math.log10(low), math.log10(high), math.log10(value)
-        return LEFT + (value - low) / (high - low) * (WIDTH - LEFT - RIGHT)
+        return self.left + (value - low) / (high - low) * (self.right - self.left)
 
     def y(self, value):
         low, high = self.y_range
@@ -82,8 +83,8 @@ class Panel:
     def level(self, value, text, colour=GREY):
         """A horizontal line across the panel with words at its left end."""
         y = self.y(value)
-        self.parts.append(f'<path d="M{LEFT} {y:.1f}H{WIDTH - RIGHT}" stroke="{colour}" stroke-dasharray="2 4"/>'
-                          f'<text x="{LEFT + 6}" y="{y - 5:.1f}" fill="{colour}">{html.escape(text)}</text>')
+        self.parts.append(f'<path d="M{self.left:.1f} {y:.1f}H{self.right:.1f}" stroke="{colour}" stroke-dasharray="2 4"/>'
+                          f'<text x="{self.left + 6:.1f}" y="{y - 5:.1f}" fill="{colour}">{html.escape(text)}</text>')
 
     def mark(self, x, text, colour=GREY, below_px=14, anchor="start"):
         """A vertical line across the panel with a word beside it."""
@@ -98,28 +99,29 @@ class Panel:
 
     def axes(self):
         bottom, out = self.top + self.height, []
-        values, decimals = ticks(*self.y_range, max(2, self.height // 25))
+        values, decimals = ticks(*self.y_range, max(3, self.height // 25))
         for value in values:
-            out.append(f'<path d="M{LEFT} {self.y(value):.1f}H{WIDTH - RIGHT}" stroke="{GRID}"/>'
-                       f'<text x="{LEFT - 8}" y="{self.y(value) + 4:.1f}" text-anchor="end">{number(value, decimals)}</text>')
+            out.append(f'<path d="M{self.left:.1f} {self.y(value):.1f}H{self.right:.1f}" stroke="{GRID}"/>'
+                       f'<text x="{self.left - 8:.1f}" y="{self.y(value) + 4:.1f}" text-anchor="end">'
+                       f'{number(value, decimals)}</text>')
         if self.x_log:
             decades = range(round(math.log10(self.x_range[0])), round(math.log10(self.x_range[1])) + 1)
             at = [(10.0 ** k, f"{10.0 ** k:g}") for k in decades]
             at += [(m * 10.0 ** k, "") for k in decades[:-1] for m in range(2, 10)]
         else:
-            values, decimals = ticks(*self.x_range, 8)
+            values, decimals = ticks(*self.x_range, max(3, int(self.right - self.left) // 80))
             at = [(value, number(value, decimals)) for value in values]
         for value, text in at:
             out.append(f'<path d="M{self.x(value):.1f} {self.top}V{bottom}" stroke="{GRID}"/>')
             if text:
                 out.append(f'<text x="{self.x(value):.1f}" y="{bottom + 17}" text-anchor="middle">{text}</text>')
-        out.append(f'<rect x="{LEFT}" y="{self.top}" width="{WIDTH - LEFT - RIGHT}" height="{self.height}" '
+        out.append(f'<rect x="{self.left:.1f}" y="{self.top}" width="{self.right - self.left:.1f}" height="{self.height}" '
                    f'fill="none" stroke="{FRAME}"/>')
         return "".join(out)
 
     def heading(self):
-        out = [f'<text x="{LEFT}" y="{self.top - 8}" font-weight="600" fill="{INK}">{html.escape(self.title)}</text>']
-        x = WIDTH - RIGHT
+        out = [f'<text x="{self.left:.1f}" y="{self.top - 8}" font-weight="600" fill="{INK}">{html.escape(self.title)}</text>']
+        x = self.right
         for label, mark in reversed(self.legend):
             x -= LETTER_PX * len(label) + 30
             out.append(f'<g transform="translate({x:.1f} {self.top - 8})">{mark}'
@@ -132,10 +134,14 @@ class Plot:
     def __init__(self, title, subtitle):
         self.title, self.subtitle, self.panels, self.bottom, self.end = title, subtitle, [], TITLE_PX, ""
 
-    def panel(self, title, height, x, y, x_log=False):
-        top = self.bottom + LEGEND_PX + (GAP_PX - 10 if self.panels else 4)
-        self.panels.append(Panel(title, top, height, x, y, x_log))
-        self.bottom = top + height
+    def panel(self, title, height, x, y, **more):
+        """`part` (0 to 1, from left to right) leaves room for another, which `beside` puts there."""
+        self.top = self.bottom + LEGEND_PX + (GAP_PX - 10 if self.panels else 4)
+        self.bottom = self.top + height
+        return self.beside(title, height, x, y, **more)
+
+    def beside(self, title, height, x, y, **more):
+        self.panels.append(Panel(title, self.top, height, x, y, **more))
         return self.panels[-1]
 
     def x_title(self, text):
@@ -144,8 +150,8 @@ class Plot:
 
     def svg(self):
         height = self.bottom + X_TITLE_PX + 6
-        clips = "".join(f'<clipPath id="p{i}"><rect x="{LEFT}" y="{p.top}" width="{WIDTH - LEFT - RIGHT}" '
-                        f'height="{p.height}"/></clipPath>' for i, p in enumerate(self.panels))
+        clips = "".join(f'<clipPath id="p{i}"><rect x="{p.left:.1f}" y="{p.top}" '
+                        f'width="{p.right - p.left:.1f}" height="{p.height}"/></clipPath>' for i, p in enumerate(self.panels))
         panels = "".join(f'{p.axes()}<g clip-path="url(#p{i})">{"".join(p.parts)}</g>{p.heading()}\n'
                          for i, p in enumerate(self.panels))
         return (f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {height}" width="{WIDTH}" '
