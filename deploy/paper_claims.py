@@ -181,8 +181,9 @@ copy of Figure 5.""", [
 **The parameters of (29)** cannot come from this one step. With white noise of 1.16 mm, one sigma of α is {alpha}, and that
 of b1 is {b1} % of its value, so the five printed digits are not determined. A motor that changes between −1 and 1 at
 random for 60 s (PRBS) would give α to ± {prbs}. The *response* of (29) is determined, and that is what we compare."""),
-    read("(29), 5.1", "uncertainty of b1 = 0.005682", PLAN_STEP, "one_sigma.b1", "Figure5.TheModelIsFoundAsFarAsTheRunCanTell",
-         scale=100 / EQUATION_29["b1"], printed=0.01, unit="%", digits=0, tolerance=1, key="b1"),
+    read("(29), 5.1", "uncertainty of b1 = 0.005682", PLAN_STEP, "one_sigma.b1",
+         "ExpectedUncertainty.IsThatOfTheReferencePlans", scale=100 / EQUATION_29["b1"], printed=0.01, unit="%", digits=0,
+         tolerance=1, key="b1"),
     read("—", "uncertainty of α from 60 s of PRBS", PLAN_PRBS, "one_sigma.alpha",
          "ExpectedUncertainty.IsThatOfTheReferencePlans", digits=3, key="prbs"),
 ], ("figure_5",))
@@ -290,12 +291,12 @@ of the softener, which nobody has confirmed to it, so its ± is wide; in water t
     read("Figure 7", "settling time after the disturbance", IN_SOFTENER, "disturbance.settling_s",
          "Figure7.DisturbanceIsRejectedAndNoOvershootHoldsApproximately", unit="s", digits=2),
     read("2.2, Figure 7", "error with a motor that cannot reverse", ONE_WAY, "step.steady_state_error_m",
-         "Robustness.ShowsThatAMotorThatCannotReverseLeavesItsOvershootForEver", scale=-1e3, printed=0, unit="mm", digits=1,
+         "Figure7.AMotorThatCannotReverseLeavesItsOvershoot", scale=-1e3, printed=0, unit="mm", digits=1,
          tolerance=0.1, key="one_way"),
-    Row("Figure 7", "true settling time, by the accelerometer", played("figure_7"), "true_position_m",
+    Row("Figure 7", "true settling time, in this run by the accelerometer", played("figure_7"), "true_position_m",
         true_settling_s("figure_7"), "OnItsAccelerometer.WithAModelThatNobodyHasConfirmedItIsWithin10MmAndSaysHowWellItKnows",
         unit="s", digits=1),
-    Row("2.2, [23]", "true error after 40 s, by the accelerometer", played("figure_7"), "true_position_m",
+    Row("2.2, [23]", "true error after 40 s, in this run", played("figure_7"), "true_position_m",
         error_at_end("figure_7", 40), "OnItsAccelerometer.WithAModelThatNobodyHasConfirmedItIsWithin10MmAndSaysHowWellItKnows",
         unit="mm", digits=1, key="drift"),
     Row("2.2, [23]", "± that the robot states then (2 sd)", played("figure_7"), "position_sd_m", two_sd_at_end,

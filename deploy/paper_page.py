@@ -31,8 +31,8 @@ A value *holds* if it deviates from the printed one by no more than the toleranc
 printed and from what can be seen in a figure. Rows without a printed value are there to be compared with the curves of the figures.
 
 `deploy/paper` makes this page and the drawings again. A test fails when what the programs print is no longer what stands
-here, to the last digit shown; the test named behind each row holds the value itself against an independent computation,
-far closer than the tolerance.
+here, to the last digit shown. The tests named below each table hold the values, most of them against reference data that
+were computed by other means.
 """
 
 CODE = """\
