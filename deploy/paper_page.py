@@ -28,11 +28,18 @@ are in `build/release/bin` after `deploy/build release`, and none of the command
 
 We have none of the paper's measurements. "Ours" is what its own equations and numbers give, computed by our programs.
 A value *holds* if it deviates from the printed one by no more than the tolerance, which is chosen from the digits that are
-printed and from what can be seen in a figure. Rows without a printed value are there to be compared with the curves of the figures.
+printed and from what can be seen in a figure. Rows without a printed value are there to be compared with the curves of the
+figures.
 
 `deploy/paper` makes this page and the drawings again. A test fails when what the programs print is no longer what stands
 here, to the last digit shown. The tests named below each table hold the values, most of them against reference data that
 were computed by other means.
+"""
+
+MISPRINTS = """\
+Misprints that change nothing: (25) has the sum of two frequency responses where the phase of their product is meant; (21)
+integrates over x where the time is meant; Section 5.1 calls V a volume, and it is the velocity of Table 1; of (11) to (14)
+it is open whether the coefficients carry their sign, and with all of them positive (28) comes out.
 """
 
 CODE = """\
@@ -169,7 +176,7 @@ class Page:
                          for place, what, where, test in PLACES)
         broken = "".join("\n" + wrapped(f"{i}. {' '.join(proof.split()).format(**self.values)} (Row {row}.)", "   ")
                          for i, (row, proof) in enumerate(self.broken, 1))
-        return "\n".join([BEGIN, "## What does not hold\n" + broken, *subjects, CODE + places])
+        return "\n".join([BEGIN, "## What does not hold\n" + broken, MISPRINTS, *subjects, CODE + places])
 
 
 def wrapped(text, indent=""):
