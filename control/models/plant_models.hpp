@@ -4,12 +4,12 @@
 //                                                                position, m per duty: H(s)/s, (22)
 //   with a dead time T: H(s) e^{-sT}                              (1a)  the duty acts so much later; not in the paper
 //   H_motor(s) = km / (Tm s + 1)                           (2)   propeller rate, rad/s per duty: (17), (27)
-//   M = m + (4/3) β ρ π · π d²/4                           (3)   mass and added mass: (13), read so that it gives (28)
-//   D = 2 u0 X|u|u + Xu,  X|u|u = ρ Cd Af/2,  Xu = ρ V Af Cd     (4)   (14), (15)
+//   M = m + (4/3) β ρ π · π d²/4                           (3)   mass and added mass: (12), read so that it gives (28)
+//   D = 2 u0 X|u|u + Xu,  X|u|u = ρ Cd Af/2,  Xu = ρ V Af Cd     (4)   (13), (14)
 //   H(s) = k / (s² + (1/Tm + D/M) s + D/(Tm M))            (5)   (18), (19), normalised
 //   k = km Ct ρ A r² / (Tm M)                              (6)   (18), read literally
 //
-// Differs from the paper: (3) has π (d/2)² where (13) prints (d/2)²; only so are 60.13 and 667.1 of (28) met, within
+// Differs from the paper: (3) has π (d/2)² where (12) prints (d/2)²; only so are 60.13 and 667.1 of (28) met, within
 // 0.04 % and 0.15 %. No sound reading of (18) gives its 232; (6) gives 3.4 to 3.6. The model keeps 232 as an empirical
 // gain and carries (6) beside it.
 // Errors: the check functions throw std::invalid_argument quoting the bad value. They name what is allowed.

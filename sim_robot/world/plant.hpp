@@ -3,7 +3,7 @@
 // Linear, any model of control::FractionalModel, exact between ticks; one that thins under shear
 // (shear_thinning_plant.hpp); or the nonlinear one of the paper's Section 3.1:
 //   Tm ω' = km u - ω                                                     (1)   (17): the propeller
-//   M v' = Ct ρ A r² ω|ω| - X|u|u v|v| - Xu v                            (2)   (1), (14), (15), (16); M with added mass
+//   M v' = Ct ρ A r² ω|ω| - X|u|u v|v| - Xu v                            (2)   (1), (13) to (16); M with added mass
 //   x' = v                                                               (3)
 // with the values of control::HydrodynamicParameters. Duty backwards turns the thrust around. (28) is (2) linearised,
 // with an empirical gain: see docs/simulator.md for how far the two are apart.

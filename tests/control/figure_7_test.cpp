@@ -20,5 +20,15 @@ TEST(Figure7, DisturbanceIsRejectedAndNoOvershootHoldsApproximately) {
   write_figure("figure_7.csv", prediction);
 }
 
+// The paper's robot has one propeller and a duty ratio of 0 to 1: what lies beyond the setpoint stays there.
+TEST(Figure7, AMotorThatCannotReverseLeavesItsOvershoot) {
+  ClosedLoopExperiment experiment = figure_experiment(kNonNewtonianModel);
+  experiment.duty_min = 0;
+  const ClosedLoopPrediction prediction = predict_closed_loop(experiment);
+  EXPECT_FALSE(prediction.step.settling_s.has_value());
+  EXPECT_NEAR(prediction.step.steady_state_error_m, -3.23e-3, 1e-5);
+  EXPECT_NEAR(prediction.step.overshoot_percent, 3.23, 0.01);
+}
+
 }  // namespace
 }  // namespace control
