@@ -2,7 +2,6 @@
 #include <spdlog/spdlog.h>
 
 #include <csignal>
-#include <iostream>
 
 #include "server/analysis/analysis_service.hpp"
 #include "server/api/api_server.hpp"
@@ -16,6 +15,7 @@
 #include "server/net/transport_security.hpp"
 #include "server/runtime/log.hpp"
 #include "server/runtime/real_time.hpp"
+#include "server/runtime/supervision.hpp"
 #include "server/station/models/model_sender.hpp"
 #include "server/storage/recording_parts.hpp"
 
@@ -61,8 +61,8 @@ static int serve(const config::Config& config) {
   tasks.spawn("signals", tasks.stop_on_signal());
   tasks.spawn("security", security.run());
   tasks.spawn("announcement", folder.announce(clock, {api.address(), options.robots_address, security.to_trust()}));
-  spdlog::info("ready: page {}, robots {}, data {}", api.url(), options.robots_address, config.data_dir.string());
-  api.print_login_url();
+  tasks.spawn("supervision", runtime::tell_supervisor(clock, "page " + api.url()));
+  api.say_ready(options.robots_address, config.data_dir);
   tasks.run(clock);   // returns when every task has ended
   recording.close();  // every sample that was received is on disk
   spdlog::info("stopped");
@@ -72,7 +72,7 @@ static int serve(const config::Config& config) {
 int main(int argc, char** argv) try {
   std::signal(SIGPIPE, SIG_IGN);
   const cli::CommandLine line = cli::parse_command_line(argc, argv);
-  if (const auto exit_code = cli::answer(line, std::cout)) return *exit_code;
+  if (const auto exit_code = cli::answer(line)) return *exit_code;
   return serve(load_config(std::get<cli::Serve>(line).flags));
 } catch (const std::exception& error) {
   fmt::print(stderr, "rheonaut: {}\n", cli::one_line(error.what()));

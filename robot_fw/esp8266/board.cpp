@@ -10,7 +10,7 @@
 namespace robot_fw::esp8266 {
 namespace {
 
-constexpr char kFirmwareVersion[] = "0.1.0-esp8266";
+constexpr char kFirmwareVersion[] = "0.9.0-esp8266";
 constexpr std::size_t kPieceBytes = 512;  // read in one turn
 
 // From the hardware's generator, which is only random while the radio is on.

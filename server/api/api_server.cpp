@@ -2,11 +2,13 @@
 #include "server/api/api_server.hpp"
 
 #include <fmt/format.h>
+#include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <cstdio>
 #include <iterator>
 
+#include "base/version.hpp"
 #include "server/api/analysis/analysis_routes.hpp"
 #include "server/api/experiments/experiment_json.hpp"
 #include "server/api/experiments/fit_of_runs.hpp"
@@ -38,7 +40,7 @@ ApiOptions api_options(const config::Config& config, std::uint64_t store_id, std
   options.or_any_port = config.http_or_any_port;
   options.data_dir = config.data_dir;
   options.hosts = config.http_hosts;
-  options.version = RHEONAUT_VERSION;
+  options.version = base::version();
   options.store_id = store_id;
   options.robots_address = std::move(robots_address);
   options.security = &security;
@@ -114,7 +116,8 @@ boost::asio::awaitable<void> ApiServer::run() {
 
 std::string ApiServer::address() const { return config::text(listener_.endpoint()); }
 
-void ApiServer::print_login_url() {
+void ApiServer::say_ready(const std::string& robots_address, const std::filesystem::path& data_dir) {
+  spdlog::info("ready: page {}, robots {}, data {}", url(), robots_address, data_dir.string());
   fmt::print("Open the cockpit with this one-time link:\n  {}\n", login_url());
   std::fflush(stdout);
 }

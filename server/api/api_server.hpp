@@ -49,7 +49,8 @@ class ApiServer {
   std::string url() const;      // "https://127.0.0.1:8080", for a browser on this machine
   const http::Router& router() const { return router_; }
   std::string login_url();  // a link that lets one page in, for 10 minutes
-  void print_login_url();   // on standard output, for the person at the console
+  // In the log, and with a link on standard output for the person at the console.
+  void say_ready(const std::string& robots_address, const std::filesystem::path& data_dir);
 
   identity::Accounts& accounts() { return accounts_; }
   const identity::Logins& logins() const { return logins_; }

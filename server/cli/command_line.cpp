@@ -10,11 +10,8 @@
 #include <stdexcept>
 #include <type_traits>
 
+#include "base/version.hpp"
 #include "server/cli/terminal/options.hpp"
-
-#ifndef RHEONAUT_VERSION
-#error "RHEONAUT_VERSION comes from CMake"
-#endif
 
 namespace server::cli {
 namespace {
@@ -70,12 +67,13 @@ std::string complaint(const CLI::App& app, const CLI::Error& error) {
 
 CommandLine parse_command_line(int argc, char** argv) {
   CLI::App app{"Rheonaut, the ground station for small robots"};
-  app.set_version_flag("--version", RHEONAUT_VERSION);
+  app.set_version_flag("--version", base::version());
   app.require_subcommand(1);
   app.footer("Example: rheonaut serve --data ~/lab --robots 127.0.0.1:7070");
   app.failure_message([](const CLI::App* whole, const CLI::Error& error) { return complaint(*whole, error); });
   CommandLine line;
   offer<Serve>(app, "serve", "Run the station until SIGINT or SIGTERM", line);
+  offer<Demo>(app, "demo", "Start a station and a simulated robot, and perform the paper's Figure 7", line);
   offer<CheckConfig>(app, "check-config", "Check a configuration and print what it means", line);
   offer<Certificate>(app, "certificate", "Make or renew the station's certificate for TLS", line);
   offer<Backup>(app, "backup", "Copy a station's database, also while it runs, and verify the copy", line);
@@ -140,5 +138,7 @@ std::optional<int> answer(const CommandLine& line, std::ostream& out) {
       },
       line);
 }
+
+std::optional<int> answer(const CommandLine& line) { return answer(line, std::cout); }
 
 }  // namespace server::cli

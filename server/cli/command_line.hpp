@@ -32,6 +32,7 @@
 #include "server/cli/design/step.hpp"
 #include "server/cli/design/tune.hpp"
 #include "server/cli/experiments/autotune.hpp"
+#include "server/cli/experiments/demo.hpp"
 #include "server/cli/experiments/experiment.hpp"
 #include "server/config/config.hpp"
 
@@ -54,13 +55,14 @@ using CommandLine = std::variant<Answered, Serve, CheckConfig, Certificate, Back
                                  Bode, Step, Identify, EstimatorQuestion, Tune, Discretise, Predict, UserCommand,
                                  TokenCommand, RobotCommand, FluidCommand, JobCommand, DesignCommand, MetricsQuestion,
                                  CompareQuestion, ImpedanceMapQuestion, ReportQuestion, CapsuleQuestion, Reproduce,
-                                 ReferenceCommand, ProfileQuestion, ExperimentCommand, Autotune>;
+                                 ReferenceCommand, ProfileQuestion, ExperimentCommand, Autotune, Demo>;
 
 CommandLine parse_command_line(int argc, char** argv);
 
 // Does everything but to serve, and returns the exit code; none for Serve. Writes to `out` only what is complete.
 // Throws what the tools throw: a sentence for the user.
 std::optional<int> answer(const CommandLine& line, std::ostream& out);
+std::optional<int> answer(const CommandLine& line);  // on standard output
 
 // Reads and checks a configuration, and prints what it means.
 int run(const CheckConfig& line, std::ostream& out);

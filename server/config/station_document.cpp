@@ -3,6 +3,8 @@
 
 #include <nlohmann/json.hpp>
 
+#include "base/version.hpp"
+
 namespace server::config {
 
 nlohmann::json limits_json(const CommandLimits& limits) {
@@ -18,7 +20,7 @@ nlohmann::json limits_json(const CommandLimits& limits) {
 
 std::string station_document(const Config& config) {
   nlohmann::json out;
-  out["version"] = RHEONAUT_VERSION;
+  out["version"] = base::version();
   const Envelope& envelope = config.envelope;
   out["limits"] = limits_json(envelope.anywhere());
   for (const auto& [fluid, limits] : envelope.of_fluid()) out["limits_of_fluid"][fluid] = limits_json(limits);

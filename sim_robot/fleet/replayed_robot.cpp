@@ -5,6 +5,7 @@
 #include <cstring>
 #include <utility>
 
+#include "base/version.hpp"
 #include "sim_robot/fleet/fleet.hpp"
 
 namespace sim_robot {
@@ -216,7 +217,7 @@ void ReplayedRobot::fill_hello(protocol::Hello& hello) const {
   hello.protocol_version = protocol::kProtocolVersion;
   copy_text(hello.robot_id, config_.robot_id);
   copy_text(hello.token, config_.token);
-  copy_text(hello.firmware_version, "sim-0.1.0 replay");
+  copy_text(hello.firmware_version, ("sim-" + std::string{base::version()} + " replay").c_str());
   hello.boot_id = config_.boot_id;
   hello.reset_cause = rheonaut_RESET_CAUSE_POWER_ON;
   hello.sample_period_us = config_.period_us;

@@ -9,18 +9,21 @@
 #include <stdexcept>
 #include <utility>
 
+#include "base/version.hpp"
+
 namespace sim_robot {
 namespace {
 
 constexpr int kRssiDbm = -50;
 constexpr double kMostDriftPpm = 100'000;
 constexpr std::uint64_t kTicksToMotorOff = 5;
+const std::string kFirmware = std::string{"sim-"} + base::version();
 
 robot_fw::RobotConfig core_config(const SimulatedRobotConfig& config) {
   robot_fw::RobotConfig core;
   core.robot_id = config.robot_id.c_str();
   core.token = config.token.c_str();
-  core.firmware_version = "sim-0.1.0";
+  core.firmware_version = kFirmware.c_str();
   core.boot_id = config.boot_id;
   core.reset_cause = config.reset_cause;
   core.duty_min = config.duty.min;

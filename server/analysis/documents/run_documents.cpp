@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include "base/json_text.hpp"
+#include "base/version.hpp"
 #include "server/analysis/comparison/aligned_runs_json.hpp"
 #include "server/analysis/metrics/metrics_json.hpp"
 #include "server/analysis/report/comparison_report.hpp"
@@ -56,7 +57,7 @@ asio::awaitable<Result<MetricsOfRun>> RunDocuments::metrics(storage::RunId id) {
   const auto& reference = computed->measures.reference;
   storage::StoredMetrics made{id,
                               kMetricsVersion,
-                              RHEONAUT_VERSION,
+                              base::version(),
                               samples,
                               reference ? reference->made_at_us : 0,
                               parts_.clock.utc_us(),
@@ -109,7 +110,7 @@ asio::awaitable<Result<std::string>> RunDocuments::report(storage::RunId id, std
   report.metrics = json::parse(found->metrics.document, nullptr, false);
   report.sha256 = co_await sha256_of(id);
   report.audit = co_await audit_of(report.run);
-  report.program = RHEONAUT_VERSION;
+  report.program = base::version();
   report.made_at_us = made_at_us.value_or(parts_.clock.utc_us());
   auto write = [report = std::move(report)] { return html_of(report); };
   co_return co_await parts_.analysis.compute(std::move(write));
@@ -207,7 +208,7 @@ asio::awaitable<Result<std::string>> RunDocuments::comparison_report(RunIds ids,
     report.runs.push_back(std::move(*run));
     report.sha256.push_back(co_await sha256_of(id));
   }
-  report.program = RHEONAUT_VERSION;
+  report.program = base::version();
   report.made_at_us = parts_.clock.utc_us();
   auto write = [report = std::move(report)] { return html_of(report); };
   co_return co_await parts_.analysis.compute(std::move(write));

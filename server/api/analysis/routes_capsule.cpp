@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include "base/json_text.hpp"
+#include "base/version.hpp"
 #include "server/analysis/analysis_service.hpp"
 #include "server/analysis/capsule/run_capsule.hpp"
 #include "server/analysis/documents/run_documents.hpp"
@@ -134,7 +135,7 @@ asio::awaitable<Result<analysis::CapsuleRequest>> capsule_of(CapsuleRoutes parts
   auto papers = co_await papers_of(parts, *run);
   if (!papers) co_return std::unexpected{papers.error()};
   analysis::CapsuleRequest request;
-  request.subject = {std::move(*run), RHEONAUT_VERSION, analysis::architecture()};
+  request.subject = {std::move(*run), base::version(), analysis::architecture()};
   request.spans = std::move(*spans);
   request.store = storage::reading_uri(parts.exports.database, false);
   auto write = [papers = std::move(*papers)] { return documents_of(papers); };

@@ -10,6 +10,7 @@
 #include <cstdio>
 #include <stdexcept>
 
+#include "base/version.hpp"
 #include "server/analysis/capsule/crate_metadata.hpp"
 #include "server/analysis/capsule/reproduction.hpp"
 #include "server/cli/terminal/options.hpp"
@@ -62,7 +63,7 @@ void write_text(std::ostream& out, const Reproduction& found) {
   if (!found.faults.empty()) return;
   fmt::print(out, "{} files have the SHA-256 that the crate says; {}\n", found.files, words_of(found.seal));
   fmt::print(out, "made by Rheonaut {} on {}, computed again by Rheonaut {} on {}\n\n", found.program,
-             found.architecture, RHEONAUT_VERSION, analysis::architecture());
+             found.architecture, base::version(), analysis::architecture());
   Table table{{"<what", "in the archive", "computed again", "<equal"}};
   for (const analysis::Reproduced& result : found.results) {
     table.row({result.name, result.stored, result.recomputed, text(result.agreement)});
@@ -80,7 +81,7 @@ void write_json(std::ostream& out, const Reproduction& found) {
                                 {"archive", words_of(found.seal)},
                                 {"made_by", found.program},
                                 {"made_on", found.architecture},
-                                {"computed_by", RHEONAUT_VERSION},
+                                {"computed_by", base::version()},
                                 {"computed_on", analysis::architecture()},
                                 {"results", nlohmann::ordered_json::array()}};
   for (const analysis::Reproduced& result : found.results) {

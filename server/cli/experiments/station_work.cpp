@@ -35,7 +35,7 @@ json StationWork::checked(const std::string& method, const std::string& target, 
 
 json StationWork::finished_job(std::int64_t job_id) const {
   for (;;) {
-    json job = get(fmt::format("/api/v1/jobs/{}?wait_ms={}", job_id, kLook_ms));
+    json job = get(fmt::format("/api/v1/jobs/{}?wait_ms={}", job_id, kLookMs));
     on_look_(job);
     if (!job.at("ended_at_us").is_null()) return job;
   }
@@ -48,7 +48,7 @@ json StationWork::finished_experiment(std::int64_t experiment_id) const {
     // Refused for one that has just ended, which the next look shows.
     const StationAnswer kept = ask_("POST", target + "/keep-alive", seen);
     if (kept.status == 200 && kept.body.contains("stamp_us")) seen["stamp_us"] = kept.body.at("stamp_us");
-    json experiment = get(fmt::format("{}?wait_ms={}", target, kLook_ms));
+    json experiment = get(fmt::format("{}?wait_ms={}", target, kLookMs));
     on_look_(experiment);
     if (has_ended(experiment)) return experiment;
   }

@@ -1,7 +1,7 @@
 // Work that a station does for a tool: a job or an experiment is begun, watched to its end, and its answer taken.
 //
 // While an experiment is watched the tool gives signs of life: the robot stops when they end, so a tool that is
-// interrupted leaves nothing moving. Every wait is a request that the station answers after kLook_ms at the latest.
+// interrupted leaves nothing moving. Every wait is a request that the station answers after kLookMs at the latest.
 // Errors: throws std::runtime_error with what the station refused.
 #pragma once
 
@@ -14,7 +14,7 @@
 
 namespace server::cli {
 
-inline constexpr int kLook_ms = 50;  // signs of life are needed every 150 ms
+inline constexpr int kLookMs = 50;  // signs of life are needed every 150 ms
 
 using AskStation =
     std::function<StationAnswer(const std::string& method, const std::string& target, const nlohmann::json& body)>;

@@ -5,6 +5,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "base/version.hpp"
 #include "server/runtime/sha256.hpp"
 #include "server/storage/audit/audit_chain.hpp"
 #include "server/storage/database/database.hpp"
@@ -113,7 +114,7 @@ asio::awaitable<Result<Design>> Designs::store(DesignRequest request, station::A
   Design design;
   design.sha256 = runtime::sha256_of(request.document);
   design.made = std::move(request);
-  design.made_with = RHEONAUT_VERSION;
+  design.made_with = base::version();
   design.made_by = by.actor;
   design.made_at_us = by.at_us;
   auto job = [&design, &by](Database& database) -> Result<void> {

@@ -6,6 +6,7 @@
 #include <boost/asio/post.hpp>
 #include <boost/asio/use_awaitable.hpp>
 
+#include "base/version.hpp"
 #include "server/runtime/counted.hpp"
 #include "server/station/state/checked.hpp"
 #include "server/storage/ingest/boot_segments.hpp"
@@ -49,7 +50,7 @@ asio::awaitable<RestoredState> Recorder::open() {
   OpenedDatabase opened = co_await database_.open(clock_.utc_us());
   boots_ = std::make_unique<BootRegistry>(opened.next_boot_key, opened.restored_at_us);
   station::AuditNote started = of_station("station.started", clock_.utc_us());
-  started.detail = fmt::format(R"({{"version":"{}","store_id":"{}"}})", RHEONAUT_VERSION, opened.restored.store_id);
+  started.detail = fmt::format(R"({{"version":"{}","store_id":"{}"}})", base::version(), opened.restored.store_id);
   on_audit(started);
   co_return std::move(opened.restored);
 }

@@ -6,6 +6,7 @@
 #include <fstream>
 #include <map>
 
+#include "base/version.hpp"
 #include "server/analysis/capsule/archive_reader.hpp"
 #include "server/analysis/capsule/archive_writer.hpp"
 #include "server/analysis/capsule/reproduction.hpp"
@@ -127,7 +128,7 @@ TEST_F(CapsuleTest, HoldsTheRunAndComesOutAgainBitForBit) {
   EXPECT_THAT(found->faults, ElementsAre());
   EXPECT_EQ(found->seal, analysis::Seal::whole);
   EXPECT_EQ(found->files, 8U);
-  EXPECT_EQ(found->program, RHEONAUT_VERSION);
+  EXPECT_EQ(found->program, base::version());
   EXPECT_GT(found->results.size(), 40U);  // 16 figures, two steps of 15 values, three plots
   EXPECT_THAT(found->results, Each(::testing::Field(&analysis::Reproduced::agreement, Agreement::bit_for_bit)));
   EXPECT_TRUE(found->is_reproduced());
@@ -147,7 +148,7 @@ TEST_F(CapsuleTest, MetadataNamesEachFileWithItsHashAndTheProgramsThatMadeIt) {
     EXPECT_EQ(file["sha256"], runtime::sha256_of(text)) << part;
     EXPECT_EQ(file["contentSize"], fmt::format("{}", text.size())) << part;
   }
-  EXPECT_EQ(entities["#rheonaut"]["softwareVersion"], RHEONAUT_VERSION);
+  EXPECT_EQ(entities["#rheonaut"]["softwareVersion"], base::version());
   EXPECT_EQ(entities["#operator"]["name"], "Ada");
   EXPECT_EQ(entities["./"]["author"]["@id"], "#operator");
 }

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 
+#include "base/version.hpp"
 #include "server/analysis/control_json.hpp"
 #include "server/runtime/sha256.hpp"
 #include "server/storage/jobs/jobs.hpp"
@@ -59,7 +60,7 @@ TEST_F(DesignRoutesTest, IsStoredWithItsOriginAndExportedAsItIs) {
   EXPECT_EQ(design["runs"], json::parse(R"([{"run_id":1,"span":0}])"));
   EXPECT_EQ(design["options"]["structure"], "fractional");
   EXPECT_EQ(design["made_by"], "token:local");
-  EXPECT_EQ(design["made_with"], RHEONAUT_VERSION);
+  EXPECT_EQ(design["made_with"], base::version());
   EXPECT_EQ(design["document"], a_fit(0.1, 0.001));
   const std::string exported = ask("GET", "/api/v1/designs/1/document").body;
   EXPECT_EQ(runtime::sha256_of(exported), design["sha256"].get<std::string>());

@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 
+#include "base/version.hpp"
 #include "server/analysis/metrics/metrics_json.hpp"
 #include "server/analysis/metrics/repeatability.hpp"
 #include "tests/server/api/api_fixture.hpp"
@@ -115,7 +116,7 @@ TEST_F(RunMetricsTest, AreComputedOnceAndKeptWithTheirVersion) {
   const json first = ask("GET", "/api/v1/runs/1/metrics").parsed();
   EXPECT_EQ(first["figures"]["samples_stored"], 200);
   EXPECT_EQ(first["version"], analysis::kMetricsVersion);
-  EXPECT_EQ(first["program"], RHEONAUT_VERSION);
+  EXPECT_EQ(first["program"], base::version());
   EXPECT_EQ(first["is_kept"], true);
   clock.run_for(5s);
   EXPECT_EQ(ask("GET", "/api/v1/runs/1/metrics").parsed(), first) << "not computed again";

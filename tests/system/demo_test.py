@@ -1,0 +1,83 @@
+"""`rheonaut demo`: both programs start, the robot gets to 0.1 m, and nothing stays behind. Real processes."""
+import json
+import pathlib
+import re
+import signal
+import sqlite3
+import subprocess
+import tempfile
+import unittest
+import urllib.request
+
+from processes import BIN, Station, wait_until
+
+WAIT_S = 250
+
+
+def running_in(folder):
+    """Processes whose command line names the folder."""
+    found = []
+    for process in pathlib.Path("/proc").glob("[0-9]*"):
+        try:
+            if str(folder).encode() in (process / "cmdline").read_bytes():
+                found.append(process.name)
+        except OSError:
+            pass  # it has ended
+    return found
+
+
+class DemoTest(unittest.TestCase):
+    def setUp(self):
+        self.folder = pathlib.Path(self.enterContext(tempfile.TemporaryDirectory(prefix="rheonaut-")))
+        self.data = self.folder / "demo"
+        self.output = self.folder / "output"
+
+    def start(self, *flags):
+        with open(self.output, "w") as output:
+            process = subprocess.Popen([str(BIN / "rheonaut"), "demo", "--data", str(self.data), *flags], stdout=output,
+                                       stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL)
+        self.addCleanup(lambda: process.poll() is None and (process.kill(), process.wait()))
+        return process
+
+    def said(self):
+        return self.output.read_text()
+
+    def test_the_robot_gets_to_the_setpoint_and_the_link_opens_the_page(self):
+        process = self.start()
+        wait_until(lambda: re.search(r"^page: (http\S+)$", self.said(), re.M), 60, "the link to the page")
+        link = re.search(r"^page: (http\S+)$", self.said(), re.M)[1]
+        with urllib.request.urlopen(link, timeout=30) as answer:
+            self.assertIn(b"<title>", answer.read())
+        # A machine that stood still has the experiment aborted, as it must be; then there is no table.
+        wait_until(lambda: "The station and the robot stay up" in self.said(), WAIT_S, "the end of the experiment")
+        if "experiment is aborted" not in self.said():
+            self.assertRegex(self.said(), r"setpoint 100\.0 mm   seen by the controller +(9\d|10\d)\.\d mm   estimated position +(9\d|10\d)\.\d ± \d+\.\d mm")
+            self.assertRegex(self.said(), r"samples: [34]\d{3} recorded, 0 lost")
+        robot = Station(self.data).robot("sim-1")
+        self.assertEqual("connected", robot["link"])
+        process.send_signal(signal.SIGINT)
+        self.assertEqual(0, process.wait(timeout=60))
+        self.assertEqual([], running_in(self.data))
+        with sqlite3.connect(f"file:{self.data / 'station.sqlite'}?mode=ro", uri=True) as database:
+            self.assertEqual(1, database.execute("SELECT count(*) FROM run").fetchone()[0])
+
+    def test_nothing_outlives_a_demo_that_is_killed(self):
+        process = self.start()
+        wait_until(lambda: (self.data / "endpoints.json").exists(), 60, "the station")
+        wait_until(lambda: len(running_in(self.data)) >= 2, 60, "its processes")
+        process.kill()
+        process.wait()
+        wait_until(lambda: not running_in(self.data), 60, "the end of what it had started")
+
+    def test_a_second_one_in_the_same_folder_says_who_is_there(self):
+        self.start()
+        wait_until(lambda: (self.data / "endpoints.json").exists(), 60, "the station")
+        second = subprocess.run([str(BIN / "rheonaut"), "demo", "--data", str(self.data), "--once"], capture_output=True,
+                                text=True, timeout=60)
+        self.assertEqual(1, second.returncode)
+        self.assertIn("another station runs in", second.stderr)
+        self.assertTrue(json.loads((self.data / "endpoints.json").read_text())["http"])
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,200 @@
+"""The Debian package, from apt to purge, in a minimal Debian 12 with systemd. Needs root, debootstrap and an archive.
+
+One story in order: installed on a bare system, the demo, the service under systemd with its watchdog, an upgrade that
+migrates, removed, purged. Without root or debootstrap it is skipped (exit status 77).
+"""
+import os
+import pathlib
+import re
+import shutil
+import signal
+import sqlite3
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+
+from debian_tree import DebianTree
+
+BUILD = pathlib.Path(os.environ["RHEONAUT_BUILD"])
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+VERSION = re.search(r"project\(rheonaut VERSION (\S+)", (ROOT / "CMakeLists.txt").read_text())[1]
+OLDER = "0.8.99"  # the same files under the number of an older release
+# Sanitizers read what the service may not see, and trace themselves at their end.
+SANITIZED = "[Service]\nEnvironment=ASAN_OPTIONS=detect_leaks=0\n"
+# Where root may raise no limit, LimitRTPRIO has no effect; a capability then shows that the rest of the unit permits it.
+NO_LIMITS = "[Service]\nPrivateUsers=no\nCapabilityBoundingSet=CAP_SYS_NICE\nAmbientCapabilities=CAP_SYS_NICE\n"
+
+
+def may_raise_limits():
+    """Whether this process has CAP_SYS_RESOURCE."""
+    status = pathlib.Path("/proc/self/status").read_text()
+    return bool(int(re.search(r"CapEff:\s+(\w+)", status)[1], 16) >> 24 & 1)
+
+
+def packed(version, folder):
+    """The package of this build."""
+    subprocess.run(["cpack", "-G", "DEB", "-D", f"CPACK_PACKAGE_VERSION={version}", "-B", str(folder)], cwd=BUILD,
+                   check=True, capture_output=True, text=True, env={**os.environ, "SOURCE_DATE_EPOCH": "1700000000"})
+    return next(pathlib.Path(folder).glob("*.deb"))
+
+
+class PackageTest(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = pathlib.Path(cls.enterClassContext(tempfile.TemporaryDirectory(prefix="rheonaut-package-")))
+        cls.tree = DebianTree(cls.folder)
+        cls.addClassCleanup(cls.tree.close)
+        begun = time.monotonic()
+        cls.older, cls.package = packed(OLDER, cls.folder / "older"), packed(VERSION, cls.folder / "new")
+        print(f"packed twice in {time.monotonic() - begun:.1f} s: {cls.package.stat().st_size / 1e6:.1f} MB")
+        begun = time.monotonic()
+        cls.tree.make()
+        cls.tree.run("apt-get", "update", "-qq")
+        print(f"a minimal Debian 12 in {time.monotonic() - begun:.1f} s")
+        for package in (cls.older, cls.package):
+            shutil.copy(package, cls.tree.tree / "root")
+
+    def path(self, inside):
+        return self.tree.tree / inside.lstrip("/")
+
+    def test_1_it_is_the_same_file_each_time(self):
+        again = packed(VERSION, self.folder / "again")
+        self.assertEqual(self.package.read_bytes(), again.read_bytes())
+
+    def test_2_apt_installs_it_on_a_bare_system(self):
+        begun = time.monotonic()
+        self.tree.run("apt-get", "install", "-y", "-qq", "--no-install-recommends", f"/root/{self.older.name}")
+        print(f"installed in {time.monotonic() - begun:.1f} s")
+        self.assertIn(VERSION, self.tree.run("rheonaut", "--version").stdout)  # what the program says, not the package
+        state = self.path("/var/lib/rheonaut").stat()
+        self.assertEqual(0o700, state.st_mode & 0o777)
+        self.assertIn(f"rheonaut:x:{state.st_uid}:", self.path("/etc/passwd").read_text())
+        checked = self.tree.run("rheonaut", "check-config", "--config", "/etc/rheonaut/rheonaut.toml").stdout
+        self.assertIn("/var/lib/rheonaut", checked)
+
+    def test_3_the_demo_brings_the_robot_to_its_setpoint(self):
+        self.tree.run("useradd", "-m", "anna")
+        begun = time.monotonic()
+        said = self.tree.run("runuser", "-u", "anna", "--", "sh", "-c", "cd && exec rheonaut demo --once", check=False)
+        print(said.stdout)
+        print(f"the demo took {time.monotonic() - begun:.1f} s")
+        # A machine that stood still has the experiment aborted, as it must be.
+        if "experiment is aborted" not in said.stdout:
+            self.assertEqual(0, said.returncode, said.stderr)
+            self.assertRegex(said.stdout, r"setpoint 100\.0 mm   seen by the controller +(9\d|10\d)\.\d mm   estimated")
+        self.assertTrue(self.path("/home/anna/rheonaut-demo/station.sqlite").exists())
+
+    def test_4_scipy_can_be_installed_beside_it(self):
+        said = self.tree.run("apt-get", "install", "-y", "--simulate", "--no-install-recommends", "python3-scipy").stdout
+        self.assertIn("Inst python3-scipy", said)
+        self.assertNotIn("Remv", said)
+
+    def test_5_the_service_runs_under_systemd_with_few_rights(self):
+        self.tree.run("apt-get", "install", "-y", "-qq", "--no-install-recommends", "systemd", "systemd-sysv")
+        for unit in ("rheonaut.service", "rheonaut-backup.service", "rheonaut-backup.timer"):
+            self.tree.run("systemd-analyze", "verify", "--man=no", f"/lib/systemd/system/{unit}")
+        # Of 10; --threshold counts tenths.
+        exposure = self.tree.run("systemd-analyze", "security", "--offline=true", "--threshold=25",
+                                 "/lib/systemd/system/rheonaut.service").stdout
+        print(exposure.splitlines()[-1])
+        drop_in = self.path("/etc/systemd/system/rheonaut.service.d")
+        drop_in.mkdir(parents=True)
+        (drop_in / "sanitized.conf").write_text(SANITIZED)
+        self.tree.boot()
+        self.tree.wait(self.is_active, "the service")
+        pid = self.tree.main_pid("rheonaut.service")
+        self.assertNotEqual(0, pathlib.Path(f"/proc/{pid}").stat().st_uid)
+        self.assertIn("NoNewPrivs:\t1", pathlib.Path(f"/proc/{pid}/status").read_text())
+        self.assertTrue(self.page_answers())
+
+    def test_5b_its_loop_gets_real_time_priority(self):
+        self.assertEqual("2", self.shown("LimitRTPRIO"))
+        if not may_raise_limits():
+            drop_in = self.path("/etc/systemd/system/rheonaut.service.d/no-limits.conf")
+            drop_in.write_text(NO_LIMITS)
+            self.addCleanup(self.restart)
+            self.addCleanup(drop_in.unlink)
+            self.restart()
+        pid = self.tree.main_pid("rheonaut.service")
+
+        def policies():
+            return {os.sched_getscheduler(int(task.name)) & ~0x40000000  # SCHED_RESET_ON_FORK
+                    for task in pathlib.Path(f"/proc/{pid}/task").iterdir()}
+        self.tree.wait(lambda: os.SCHED_RR in policies(), "real-time priority")
+
+    def test_6_a_station_that_stands_still_is_started_again(self):
+        pid = self.tree.main_pid("rheonaut.service")
+        os.kill(pid, signal.SIGSTOP)
+        begun = time.monotonic()
+        self.tree.wait(lambda: self.tree.main_pid("rheonaut.service") not in (pid, None) and self.is_active(),
+                       "another station")
+        print(f"a halted station was replaced after {time.monotonic() - begun:.1f} s")
+        self.assertTrue(self.page_answers())
+        log = self.tree.inside("journalctl", "-u", "rheonaut.service", "--no-pager").stdout
+        self.assertIn("Watchdog timeout", log)
+
+    def test_7_an_upgrade_migrates_and_keeps_a_copy(self):
+        self.tree.inside("systemctl", "stop", "rheonaut.service")
+        database = self.path("/var/lib/rheonaut/station.sqlite")
+        owner = database.parent.stat()
+        for leftover in database.parent.glob("station.*"):
+            leftover.unlink()
+        with sqlite3.connect(database) as old:
+            old.executescript((ROOT / "tests/data/recording/version_6.sql").read_text())
+            samples = old.execute("SELECT count(*) FROM sample").fetchone()[0]
+        os.chown(database, owner.st_uid, owner.st_gid)
+        database.chmod(0o600)
+        self.tree.inside("dpkg", "-i", f"/root/{self.package.name}")
+        self.tree.wait(self.is_active, "the upgraded service")
+        self.assertIn(f"Version: {VERSION}", self.tree.inside("dpkg", "-s", "rheonaut").stdout)
+        copy = database.with_name("station.sqlite.schema-6")
+        for file in (copy, database):
+            with sqlite3.connect(f"file:{file}?mode=ro", uri=True) as kept:
+                self.assertEqual(samples, kept.execute("SELECT count(*) FROM sample").fetchone()[0])
+        self.assertTrue(self.page_answers())
+
+    def test_8_the_daily_backup_is_made(self):
+        self.tree.inside("systemctl", "start", "rheonaut-backup.service")
+        self.assertEqual(1, len(list(self.path("/var/lib/rheonaut/daily").glob("daily-*.sqlite"))))
+
+    def test_9a_removing_it_ends_the_service_and_leaves_the_recordings(self):
+        self.tree.inside("apt-get", "remove", "-y", "-qq", "rheonaut")
+        self.assertIsNone(self.tree.main_pid("rheonaut.service"))
+        self.assertFalse(self.path("/usr/bin/rheonaut").exists())
+        self.assertTrue(self.path("/etc/rheonaut/rheonaut.toml").exists())
+
+    def test_9b_a_purge_that_nobody_answers_keeps_the_recordings(self):
+        self.tree.inside("dpkg", "--purge", "rheonaut")
+        self.assertTrue(self.path("/var/lib/rheonaut/station.sqlite").exists())
+        self.assertFalse(self.path("/etc/rheonaut/rheonaut.toml").exists())
+
+    def test_9c_a_purge_that_somebody_answers_with_yes_removes_them(self):
+        self.tree.inside("dpkg", "-i", f"/root/{self.package.name}")
+        self.tree.wait(self.is_active, "the service, installed again")
+        answer = "rheonaut rheonaut/remove-data boolean true\n"
+        self.tree.inside("sh", "-c", f"printf '{answer}' | debconf-set-selections")
+        self.tree.inside("dpkg", "--purge", "rheonaut")
+        self.assertFalse(self.path("/var/lib/rheonaut").exists())
+
+    def restart(self):
+        self.tree.inside("systemctl", "daemon-reload")
+        self.tree.inside("systemctl", "restart", "rheonaut.service")
+
+    def shown(self, name):
+        return self.tree.inside("systemctl", "show", "-p", name, "--value", "rheonaut.service").stdout.strip()
+
+    def is_active(self):
+        return self.tree.inside("systemctl", "is-active", "rheonaut.service", check=False).stdout.strip() == "active"
+
+    def page_answers(self):
+        ask = "import urllib.request as u; print(u.urlopen('http://127.0.0.1:8080/', timeout=60).read().decode())"
+        return "<title>" in self.tree.in_its_network("/usr/bin/python3", "-c", ask).stdout
+
+
+if __name__ == "__main__":
+    if os.geteuid() != 0 or not shutil.which("debootstrap"):
+        print("needs root and debootstrap")
+        sys.exit(77)
+    unittest.main()
