@@ -27,6 +27,7 @@ const sidebar = [
       page('Experiments', 'experiments'),
       page('HTTP and live interface', 'api'),
       page('Operations', 'operations'),
+      page('Hardware', 'hardware'),
       page('Many robots', 'fleet'),
       page('Simulated robot', 'simulator'),
       page('Scenarios', 'scenarios'),
