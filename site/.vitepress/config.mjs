@@ -1,4 +1,5 @@
 // The site of the documents: what stands where in its menus, and how Markdown is read. Made by site/build.mjs.
+import { readFileSync, readdirSync } from 'node:fs';
 import { defineConfig } from 'vitepress';
 
 // As GitHub makes the anchors of headings, so that one link is right in both places; tests/check_docs.py follows them.
@@ -44,6 +45,7 @@ const sidebar = [
       page('Reliability', 'reliability'),
       page('Security', 'security'),
       page('Performance', 'performance'),
+      page('The paper, number by number', 'paper'),
       page('References', 'references'),
     ],
   },
@@ -58,6 +60,16 @@ const sidebar = [
     ],
   },
 ];
+
+// A document that no menu above names yet is in one of its own, by its first heading.
+const listed = new Set(sidebar.flatMap(({ items }) => items.map(({ link }) => link)));
+const pages = new URL('../pages/', import.meta.url);
+const others = ['', 'docs/'].flatMap((folder) =>
+  readdirSync(new URL(folder || '.', pages))
+    .filter((name) => name.endsWith('.md') && name !== 'index.md' && !listed.has(`/${folder}${name.slice(0, -3)}`))
+    .map((name) => ({ text: /^# (.+)$/m.exec(readFileSync(new URL(folder + name, pages), 'utf8'))?.[1] ?? name, link: `/${folder}${name.slice(0, -3)}` })),
+);
+if (others.length > 0) sidebar.push({ text: 'More', items: others });
 
 export default defineConfig({
   title: 'Rheonaut',
