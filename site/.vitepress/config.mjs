@@ -14,6 +14,7 @@ const sidebar = [
       { text: 'Rheonaut', link: '/' },
       page('All documents', ''),
       page('Concepts', 'concepts'),
+      page('A first robot', 'first_robot'),
       page('A first working day', 'tutorial'),
       page('Questions and answers', 'faq'),
       page('Troubleshooting', 'troubleshooting'),
