@@ -4,7 +4,8 @@
 
 A path in backquotes that begins with one of our folders must be a file or folder, with or without its suffix; `*` and
 `<noun>` match anything. A block of code that names a file, as "```cpp tests/sim_robot/story_examples_test.cpp", must
-stand in that file word for word. The station's own kinds of events are those of the table in docs/database.md.
+stand in that file word for word. The station's own kinds of events are those of the table in docs/database.md,
+and the figures of the sizing table those of docs/performance.md.
 Every decision has a number of its own and a row in docs/decisions/README.md, which also names the numbers that were never
 given. Prints `file:line: what is missing` and fails if anything is.
 """
@@ -82,6 +83,19 @@ def event_kinds(root):
     yield from (f"docs/database.md: the station makes no event {kind}" for kind in sorted(listed - made))
 
 
+def sizing(root):
+    """Figures of the sizing table that docs/performance.md does not have as measured."""
+    document, measured = root / "docs/operations.md", root / "docs/performance.md"
+    if not (document.is_file() and measured.is_file()):
+        return
+    section = re.search(r"^## Sizing$(.*?)^## ", document.read_text(encoding="utf-8"), re.M | re.S)
+    rows = "\n".join(re.findall(r"^\|.*", section.group(1), re.M)) if section else ""
+    known = re.sub(r"\s+", " ", measured.read_text(encoding="utf-8"))
+    for figure in sorted(set(re.findall(r"\b[\d.]+ (?:µs|MB)", rows))):
+        if not re.search(r"(?<![\d.])" + re.escape(figure), known):
+            yield f"docs/operations.md: docs/performance.md has no {figure}"
+
+
 def decision_numbers(root):
     """What is wrong with the numbers of the decisions and with their index."""
     folder = root / "docs/decisions"
@@ -104,6 +118,7 @@ def decision_numbers(root):
 def faults(root):
     yield from event_kinds(root)
     yield from decision_numbers(root)
+    yield from sizing(root)
     documents = [*root.glob("*.md"), *root.glob("docs/**/*.md")]
     for document in sorted(documents):
         text = document.read_text(encoding="utf-8")

@@ -47,6 +47,15 @@ class CheckDocs(unittest.TestCase):
             self.assertEqual(list(faults(root)), ["docs/database.md: no row for the event connected of the station",
                                                   "docs/database.md: the station makes no event gone"])
 
+    def test_the_sizing_table_has_measured_figures(self):
+        with tempfile.TemporaryDirectory() as folder:
+            docs = pathlib.Path(folder) / "docs"
+            docs.mkdir()
+            (docs / "operations.md").write_text("## Sizing\n\nabout 9 MB\n| 1 | 19 MB |\n| 2 | 2.2 µs |\n| 3 | 7 MB |\n\n## End\n")
+            (docs / "performance.md").write_text("19\nMB resident, 12.2 µs and 47 MB\n")
+            self.assertEqual(list(faults(pathlib.Path(folder))), ["docs/operations.md: docs/performance.md has no 2.2 µs",
+                                                                  "docs/operations.md: docs/performance.md has no 7 MB"])
+
     def test_decisions_have_numbers_without_doubles_and_unexplained_holes(self):
         with tempfile.TemporaryDirectory() as folder:
             decisions = pathlib.Path(folder) / "docs/decisions"

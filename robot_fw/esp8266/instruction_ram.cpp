@@ -6,7 +6,7 @@
 
 // With MMU_IRAM_HEAP the block is the allocator's, and taking it would destroy what others have there.
 #if !defined(MMU_SEC_HEAP) || !defined(MMU_SEC_HEAP_SIZE) || defined(MMU_IRAM_HEAP)
-#error "Build with the MMU option 16KB cache + 32KB IRAM + 16KB 2nd Heap (not shared): docs/robot.md, Flashing."
+#error "Build with the MMU option 16KB cache + 32KB IRAM + 16KB 2nd Heap (not shared): docs/hardware.md, Flashing."
 #endif
 
 namespace robot_fw::esp8266 {

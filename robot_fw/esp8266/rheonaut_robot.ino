@@ -1,4 +1,4 @@
-// The sketch: one robot, begun once and stepped for ever. docs/robot.md says how it gets onto the board.
+// The sketch: one robot, begun once and stepped for ever. docs/hardware.md says how it gets onto the board.
 #include <rheonaut_robot.h>
 
 #include "secrets.hpp"

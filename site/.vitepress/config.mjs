@@ -1,4 +1,5 @@
 // The site of the documents: what stands where in its menus, and how Markdown is read. Made by site/build.mjs.
+import { readFileSync, readdirSync } from 'node:fs';
 import { defineConfig } from 'vitepress';
 
 // As GitHub makes the anchors of headings, so that one link is right in both places; tests/check_docs.py follows them.
@@ -13,6 +14,7 @@ const sidebar = [
       { text: 'Rheonaut', link: '/' },
       page('All documents', ''),
       page('Concepts', 'concepts'),
+      page('A first robot', 'first_robot'),
       page('A first working day', 'tutorial'),
       page('Questions and answers', 'faq'),
       page('Troubleshooting', 'troubleshooting'),
@@ -27,6 +29,7 @@ const sidebar = [
       page('Experiments', 'experiments'),
       page('HTTP and live interface', 'api'),
       page('Operations', 'operations'),
+      page('Hardware', 'hardware'),
       page('Many robots', 'fleet'),
       page('Simulated robot', 'simulator'),
       page('Scenarios', 'scenarios'),
@@ -43,6 +46,7 @@ const sidebar = [
       page('Reliability', 'reliability'),
       page('Security', 'security'),
       page('Performance', 'performance'),
+      page('The paper, number by number', 'paper'),
       page('References', 'references'),
     ],
   },
@@ -57,6 +61,16 @@ const sidebar = [
     ],
   },
 ];
+
+// A document that no menu above names yet is in one of its own, by its first heading.
+const listed = new Set(sidebar.flatMap(({ items }) => items.map(({ link }) => link)));
+const pages = new URL('../pages/', import.meta.url);
+const others = ['', 'docs/'].flatMap((folder) =>
+  readdirSync(new URL(folder || '.', pages))
+    .filter((name) => name.endsWith('.md') && name !== 'index.md' && !listed.has(`/${folder}${name.slice(0, -3)}`))
+    .map((name) => ({ text: /^# (.+)$/m.exec(readFileSync(new URL(folder + name, pages), 'utf8'))?.[1] ?? name, link: `/${folder}${name.slice(0, -3)}` })),
+);
+if (others.length > 0) sidebar.push({ text: 'More', items: others });
 
 export default defineConfig({
   title: 'Rheonaut',

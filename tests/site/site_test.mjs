@@ -70,7 +70,7 @@ async function look(origin) {
     page.on('pageerror', (error) => wrong.push(String(error)));
     for (const [width, height] of [[1440, 900], [390, 844]]) {
       await page.setViewportSize({ width, height });
-      for (const path of ['', 'docs/concepts.html', 'docs/troubleshooting.html', 'docs/tutorial.html', 'ARCHITECTURE.html']) {
+      for (const path of ['', 'docs/concepts.html', 'docs/troubleshooting.html', 'docs/first_robot.html', 'docs/hardware.html', 'ARCHITECTURE.html']) {
         await page.goto(`${origin}${kBase}${path}`);
         await page.locator('.vp-doc h1').waitFor();
         const wide = await page.evaluate(() => document.documentElement.scrollWidth);
