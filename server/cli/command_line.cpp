@@ -76,6 +76,7 @@ CommandLine parse_command_line(int argc, char** argv) {
   app.failure_message([](const CLI::App* whole, const CLI::Error& error) { return complaint(*whole, error); });
   CommandLine line;
   offer<Serve>(app, "serve", "Run the station until SIGINT or SIGTERM", line);
+  offer<StopCommand>(app, "stop", "Emergency stop of robots, or of all robots", line);
   offer<CheckConfig>(app, "check-config", "Check a configuration and print what it means", line);
   offer<Certificate>(app, "certificate", "Make or renew the station's certificate for TLS", line);
   offer<Backup>(app, "backup", "Copy a station's database, also while it runs, and verify the copy", line);

@@ -33,6 +33,7 @@
 #include "server/cli/design/tune.hpp"
 #include "server/cli/experiments/autotune.hpp"
 #include "server/cli/experiments/experiment.hpp"
+#include "server/cli/robots/stop.hpp"
 #include "server/config/config.hpp"
 
 namespace server::cli {
@@ -54,7 +55,7 @@ using CommandLine = std::variant<Answered, Serve, CheckConfig, Certificate, Back
                                  Bode, Step, Identify, EstimatorQuestion, Tune, Discretise, Predict, UserCommand,
                                  TokenCommand, RobotCommand, FluidCommand, JobCommand, DesignCommand, MetricsQuestion,
                                  CompareQuestion, ImpedanceMapQuestion, ReportQuestion, CapsuleQuestion, Reproduce,
-                                 ReferenceCommand, ProfileQuestion, ExperimentCommand, Autotune>;
+                                 ReferenceCommand, ProfileQuestion, ExperimentCommand, Autotune, StopCommand>;
 
 CommandLine parse_command_line(int argc, char** argv);
 
