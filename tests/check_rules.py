@@ -27,7 +27,7 @@ MAY_INCLUDE = {
 # Rooms from the lowest to the highest: each may include those before it, if its CMakeLists.txt says that it uses them.
 # ARCHITECTURE.md lists them in this order. server/main.cpp and sim_robot/main.cpp stand above all.
 ROOMS = """
-base base/tls
+base base/command_line base/tls
 control/models control/responses control/sensor control/search control/identification control/discretisation
 control/tuning sim_robot/world sim_robot/robot sim_robot/network sim_robot/faults sim_robot/scenario sim_robot/lab
 sim_robot/client sim_robot/fleet sim_robot/proxy sim_robot/cli

@@ -38,10 +38,10 @@ class StopTest(unittest.TestCase):
         return station, processes
 
     def assert_latched(self, station, robot):
-        found = wait_until(lambda: station.robot(robot)["mode"] == "emergency" and station.robot(robot), 60,
-                           f"emergency of {robot} in telemetry")
-        self.assertEqual(found["sample"]["duty"], 0.0)
-        self.assertIsNotNone(found["emergency_id"])
+        def latched():
+            seen = station.robot(robot)
+            return seen["mode"] == "emergency" and seen["emergency_id"] and seen["sample"]["duty"] == 0.0
+        wait_until(latched, 60, f"emergency of {robot} in telemetry, with duty 0")
 
     def test_one_robot_and_then_all(self):
         with lab() as place:
