@@ -4,6 +4,10 @@
 #include <csignal>
 #include <iostream>
 
+#include "base/command_line/help.hpp"
+#include "base/command_line/reference_flags.hpp"
+#include "base/command_line/suggestion.hpp"
+#include "base/version.hpp"
 #include "sim_robot/cli/flow_command.hpp"
 #include "sim_robot/cli/play_command.hpp"
 #include "sim_robot/cli/predict_command.hpp"
@@ -32,13 +36,19 @@ constexpr const char* kExamples = R"(Examples:
   rheonaut-sim predict --fluid water                           what the closed loop will do
 The keys of a scenario and the HTTP control: docs/scenarios.md; fleets: docs/fleet.md)";
 
+const base::command_line::ManualSection kExitStatuses{
+    "EXIT STATUS", {{"0", "done"}, {"1", "failed; of a fleet: samples are lost"}, {"2", "the command line is wrong"}}};
+
 }  // namespace
 
 int main(int argc, char** argv) try {
   std::signal(SIGPIPE, SIG_IGN);  // OpenSSL writes to sockets whose station is gone
-  CLI::App app{"Simulated swimming robot: the firmware core in a simulated world, connected to a Rheonaut station."};
-  app.footer(kExamples);
+  CLI::App app{"Simulated swimming robot: the firmware core in a simulated world", "rheonaut-sim"};
+  app.formatter(base::command_line::help_formatter());
+  app.set_help_flag("-h,--help", "Print this help and exit");
+  app.failure_message([](const auto* all, const auto& error) { return base::command_line::complaint(*all, error); });
   app.require_subcommand(0, 1);
+  base::command_line::add_reference_flags(app, base::version(), {kExitStatuses});
   sim_robot::RunCommand run{app};
   sim_robot::ReplayCommand replay{app};
   sim_robot::ScenariosCommand scenarios{app};
@@ -47,6 +57,7 @@ int main(int argc, char** argv) try {
   sim_robot::FlowCommand flow{app};
   sim_robot::PumpCommand pump{app};
   sim_robot::ProxyCommand proxy{app};
+  app.footer(kExamples);  // after the commands, which would inherit it
   try {
     app.parse(argc, argv);
     if (replay.chosen()) return replay.run();
@@ -58,7 +69,7 @@ int main(int argc, char** argv) try {
     if (proxy.chosen()) return proxy.run();
     return run.run();
   } catch (const CLI::ParseError& error) {
-    return app.exit(error);
+    return base::command_line::answer(app, error);
   }
 } catch (const std::exception& error) {
   std::cerr << "rheonaut-sim: " << error.what() << '\n';

@@ -27,7 +27,7 @@ MAY_INCLUDE = {
 # Rooms from the lowest to the highest: each may include those before it, if its CMakeLists.txt says that it uses them.
 # ARCHITECTURE.md lists them in this order. server/main.cpp and sim_robot/main.cpp stand above all.
 ROOMS = """
-base base/tls
+base base/command_line base/tls
 control/models control/responses control/sensor control/search control/identification control/discretisation
 control/tuning sim_robot/world sim_robot/robot sim_robot/network sim_robot/faults sim_robot/scenario sim_robot/lab
 sim_robot/client sim_robot/fleet sim_robot/proxy sim_robot/cli
@@ -39,7 +39,7 @@ server/storage/query server/storage/export server/storage/upkeep server/storage
 server/analysis/metrics server/analysis/comparison server/analysis/report server/analysis/capsule server/analysis server/analysis/tuning
 server/analysis/documents server/experiments server/experiments/adaptive server/experiments/runner server/identity server/http
 server/api/bodies server/api/routes server/api/analysis server/api/experiments server/api server/cli/terminal server/cli/design
-server/cli/accounts server/cli/analysis server/cli/data server/cli/experiments server/cli
+server/cli/accounts server/cli/robots server/cli/analysis server/cli/data server/cli/experiments server/cli
 """.split()
 ROOMS_WITH_CONTROL = {"server/" + room for room in "analysis analysis/metrics analysis/tuning experiments experiments/adaptive experiments/runner cli/design".split()}
 # What decides only about the order of work, and the files of server/ that know it ("Threads of the station").

@@ -6,11 +6,15 @@
 #include <CLI/CLI.hpp>
 #include <iostream>
 #include <memory>
+#include <set>
 #include <sstream>
 #include <stdexcept>
 #include <type_traits>
 
+#include "base/command_line/help.hpp"
+#include "base/command_line/suggestion.hpp"
 #include "base/version.hpp"
+#include "server/cli/terminal/exit_status.hpp"
 #include "server/cli/terminal/options.hpp"
 
 namespace server::cli {
@@ -47,33 +51,64 @@ void offer(CLI::App& app, const char* name, const char* purpose, CommandLine& li
   command->callback([parsed, &line] { line = *parsed; });
 }
 
-// One line, also for what CLI11 says in two; a word that is no command is named.
-std::string complaint(const CLI::App& app, const CLI::Error& error) {
-  const auto chosen = app.get_subcommands();
-  const auto unknown = app.remaining(false);
-  std::string what = error.what();
-  if (chosen.empty() && !unknown.empty() && !unknown.front().starts_with('-')) {
-    what = fmt::format("there is no command '{}'", unknown.front());
+// The headings of --help, in its order, and their commands.
+const std::vector<std::pair<const char*, std::vector<std::string_view>>> kGroups{
+    {"Running a station", {"serve", "demo", "check-config", "certificate", "backup", "restore", "verify"}},
+    {"Robots", {"stop", "robot", "fluid"}},
+    {"Experiments", {"profile", "experiment", "autotune"}},
+    {"Recordings",
+     {"export", "reference", "metrics", "compare", "impedance-map", "report", "capsule", "reproduce", "job"}},
+    {"Models and controllers",
+     {"model", "bode", "step", "identify", "estimator", "tune", "discretise", "predict", "design"}},
+    {"Accounts", {"user", "token"}},
+    {"This program", {"completion", "man"}}};
+
+const std::set<std::string_view> kFileOptions{"config", "csv", "duty-csv", "motor-csv",
+                                              "file",   "to",  "plant",    "controller"};
+
+void group(CLI::App& app) {
+  for (const auto& [heading, names] : kGroups) {
+    for (const std::string_view name : names) app.get_subcommand(std::string{name})->group(heading);
   }
-  // CLI11 puts "--name: " before what a validator says.
-  if (const std::size_t colon = what.find(": must "); what.starts_with("--") && colon != std::string::npos) {
-    what.erase(colon, 1);
+}
+
+// What stands for the values of options that name files or folders.
+void name_values(CLI::App& command) {
+  for (CLI::Option* option : command.get_options()) {
+    for (const std::string& name : option->get_lnames()) {
+      if (name == "data") option->type_name("FOLDER");
+      if (kFileOptions.contains(name)) option->type_name("FILE");
+    }
   }
-  const std::string command = chosen.empty() ? "" : chosen.front()->get_name() + " ";
-  return fmt::format("rheonaut: {}; see rheonaut {}--help\n", one_line(what), command);
+  for (CLI::App* one : command.get_subcommands({})) name_values(*one);
+}
+
+template <class T>
+int write_of_program(const T& options, std::ostream& out) {
+  CLI::App app;
+  CommandLine unused;
+  define_command_line(app, unused);
+  write(options, app, out);
+  return 0;
 }
 
 }  // namespace
 
-CommandLine parse_command_line(int argc, char** argv) {
-  CLI::App app{"Rheonaut, the ground station for small robots"};
-  app.set_version_flag("--version", base::version());
+int run(const CompletionCommand& line, std::ostream& out) { return write_of_program(line, out); }
+int run(const ManualCommand& line, std::ostream& out) { return write_of_program(line, out); }
+
+void define_command_line(CLI::App& app, CommandLine& line) {
+  app.name("rheonaut");
+  app.description("Rheonaut, the ground station for small swimming robots");
+  app.formatter(base::command_line::help_formatter());
+  app.set_version_flag("--version", base::version(), "Print the version and exit");
+  app.set_help_flag("-h,--help", "Print this help and exit");
   app.require_subcommand(1);
-  app.footer("Example: rheonaut serve --data ~/lab --robots 127.0.0.1:7070");
-  app.failure_message([](const CLI::App* whole, const CLI::Error& error) { return complaint(*whole, error); });
-  CommandLine line;
+  app.failure_message(
+      [](const CLI::App* whole, const CLI::Error& error) { return base::command_line::complaint(*whole, error); });
   offer<Serve>(app, "serve", "Run the station until SIGINT or SIGTERM", line);
   offer<Demo>(app, "demo", "Start a station and a simulated robot, and perform the paper's Figure 7", line);
+  offer<StopCommand>(app, "stop", "Emergency stop of robots, or of all robots", line);
   offer<CheckConfig>(app, "check-config", "Check a configuration and print what it means", line);
   offer<Certificate>(app, "certificate", "Make or renew the station's certificate for TLS", line);
   offer<Backup>(app, "backup", "Copy a station's database, also while it runs, and verify the copy", line);
@@ -110,10 +145,24 @@ CommandLine parse_command_line(int argc, char** argv) {
   offer<Autotune>(app, "autotune",
                   "From an identification experiment to a verified controller on a robot, in one command", line);
   offer<Verify>(app, "verify", "Check a station's database and the certificates of its runs", line);
+  offer<CompletionCommand>(app, "completion", "Print the completion script for bash, zsh or fish", line);
+  offer<ManualCommand>(app, "man", "Print a manual page", line);
+  app.footer(
+      "Each command explains itself: rheonaut COMMAND --help\n"
+      "Example: rheonaut serve --data ~/lab --robots 127.0.0.1:7070\n"
+      "Example: rheonaut stop --data ~/lab");
+  group(app);
+  name_values(app);
+}
+
+CommandLine parse_command_line(int argc, char** argv) {
+  CLI::App app;
+  CommandLine line;
+  define_command_line(app, line);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    const Answered answered{app.exit(error)};
+    const Answered answered{base::command_line::answer(app, error)};
     if (!std::cout.flush()) throw std::runtime_error{kNotWritten};
     return answered;
   }
@@ -130,7 +179,13 @@ std::optional<int> answer(const CommandLine& line, std::ostream& out) {
           return options.exit_code;
         } else {
           std::ostringstream text;
-          const int exit_code = run(options, text);
+          int exit_code = 0;
+          try {
+            exit_code = run(options, text);
+          } catch (const UsageError& error) {
+            fmt::print(stderr, "rheonaut: {}\n", one_line(error.what()));
+            return base::command_line::kUsageError;
+          }
           out << text.view() << std::flush;
           if (!out) throw std::runtime_error{kNotWritten};
           return exit_code;

@@ -34,6 +34,8 @@
 #include "server/cli/experiments/autotune.hpp"
 #include "server/cli/experiments/demo.hpp"
 #include "server/cli/experiments/experiment.hpp"
+#include "server/cli/reference_pages.hpp"
+#include "server/cli/robots/stop.hpp"
 #include "server/config/config.hpp"
 
 namespace server::cli {
@@ -51,18 +53,27 @@ struct Answered {
   int exit_code = 0;
 };
 
-using CommandLine = std::variant<Answered, Serve, CheckConfig, Certificate, Backup, Restore, Verify, Export, Model,
-                                 Bode, Step, Identify, EstimatorQuestion, Tune, Discretise, Predict, UserCommand,
-                                 TokenCommand, RobotCommand, FluidCommand, JobCommand, DesignCommand, MetricsQuestion,
-                                 CompareQuestion, ImpedanceMapQuestion, ReportQuestion, CapsuleQuestion, Reproduce,
-                                 ReferenceCommand, ProfileQuestion, ExperimentCommand, Autotune, Demo>;
+using CommandLine =
+    std::variant<Answered, Serve, CheckConfig, Certificate, Backup, Restore, Verify, Export, Model, Bode, Step,
+                 Identify, EstimatorQuestion, Tune, Discretise, Predict, UserCommand, TokenCommand, RobotCommand,
+                 FluidCommand, JobCommand, DesignCommand, MetricsQuestion, CompareQuestion, ImpedanceMapQuestion,
+                 ReportQuestion, CapsuleQuestion, Reproduce, ReferenceCommand, ProfileQuestion, ExperimentCommand,
+                 Autotune, Demo, StopCommand, CompletionCommand, ManualCommand>;
+
+// The program with all its commands; the one that is chosen when `app` parses becomes `line`.
+void define_command_line(CLI::App& app, CommandLine& line);
 
 CommandLine parse_command_line(int argc, char** argv);
 
 // Does everything but to serve, and returns the exit code; none for Serve. Writes to `out` only what is complete.
-// Throws what the tools throw: a sentence for the user.
+// Options that do not go together are explained on standard error. Throws what the tools throw: a sentence for the
+// user.
 std::optional<int> answer(const CommandLine& line, std::ostream& out);
 std::optional<int> answer(const CommandLine& line);  // on standard output
+
+// Define the command line once more, and write what follows from it.
+int run(const CompletionCommand& line, std::ostream& out);
+int run(const ManualCommand& line, std::ostream& out);
 
 // Reads and checks a configuration, and prints what it means.
 int run(const CheckConfig& line, std::ostream& out);

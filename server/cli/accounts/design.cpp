@@ -14,6 +14,7 @@
 
 #include "server/cli/accounts/account_access.hpp"
 #include "server/cli/accounts/station_client.hpp"
+#include "server/cli/terminal/exit_status.hpp"
 #include "server/cli/terminal/options.hpp"
 #include "server/cli/terminal/output.hpp"
 
@@ -86,7 +87,7 @@ int list(const DesignCommand& options, std::ostream& out) {
 
 int save(const DesignCommand& options, std::ostream& out) {
   if (options.file.has_value() == options.job.has_value()) {
-    throw std::runtime_error{"give one of FILE, what a tool printed, and --job, whose result is to be kept"};
+    throw UsageError{"give one of FILE, what a tool printed, and --job, whose result is to be kept"};
   }
   json body{{"kind", options.kind}, {"name", options.name}};
   if (!options.notes.empty()) body["notes"] = options.notes;

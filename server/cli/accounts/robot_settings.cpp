@@ -13,6 +13,7 @@
 #include "server/analysis/control_json.hpp"
 #include "server/cli/accounts/station_client.hpp"
 #include "server/cli/design/discretise.hpp"
+#include "server/cli/terminal/exit_status.hpp"
 #include "server/cli/terminal/options.hpp"
 #include "server/cli/terminal/output.hpp"
 
@@ -94,7 +95,7 @@ int set_parameter(const Robot& robot, const RobotSettingsCommand& options, std::
   const auto read = sign == std::string::npos ? std::from_chars_result{end, std::errc::invalid_argument}
                                               : std::from_chars(options.set.data() + sign + 1, end, value);
   if (sign == 0 || read.ec != std::errc{} || read.ptr != end) {
-    throw std::runtime_error{fmt::format("--set '{}' is not NAME=VALUE, such as duty_slew_per_s=5", options.set)};
+    throw UsageError{fmt::format("--set '{}' is not NAME=VALUE, such as duty_slew_per_s=5", options.set)};
   }
   json body{{"kind", "set_parameter"}, {"name", options.set.substr(0, sign)}, {"value", value}};
   if (options.confirm) body["confirm"] = true;

@@ -6,13 +6,12 @@
 #include <boost/asio/connect.hpp>
 #include <boost/asio/ssl.hpp>
 #include <boost/beast/core/flat_buffer.hpp>
-#include <boost/beast/http.hpp>
 #include <fstream>
 #include <stdexcept>
 
+#include "server/cli/accounts/station_http.hpp"
 #include "server/config/endpoint.hpp"
 #include "server/storage/database/finished_file.hpp"
-#include "server/tls/tls_certificate.hpp"
 
 namespace server::cli {
 namespace asio = boost::asio;
@@ -46,23 +45,8 @@ std::string token_of(const std::filesystem::path& file) {
   return token;
 }
 
-using Request = http::request<http::string_body>;
-
-constexpr std::uint64_t kMaxAnswerBytes = 2'000'000'000;  // of an archive of hours
-
-StationAnswer answer_of(http::response<http::string_body> response) {
-  StationAnswer answer;
-  answer.status = static_cast<int>(response.result_int());
-  if (response[http::field::content_type].contains("json")) {
-    answer.body = nlohmann::json::parse(response.body());
-  } else {
-    answer.text = std::move(response.body());
-  }
-  return answer;
-}
-
 template <class Stream>
-StationAnswer converse(Stream& stream, const Request& request) {
+StationAnswer converse(Stream& stream, const HttpRequest& request) {
   http::write(stream, request);
   boost::beast::flat_buffer buffer;
   http::response_parser<http::string_body> parser;
@@ -73,7 +57,7 @@ StationAnswer converse(Stream& stream, const Request& request) {
 
 // The body goes into the file; that of a refusal is the answer.
 template <class Stream>
-StationAnswer download(Stream& stream, const Request& request, const std::filesystem::path& file) {
+StationAnswer download(Stream& stream, const HttpRequest& request, const std::filesystem::path& file) {
   http::write(stream, request);
   boost::beast::flat_buffer buffer;
   http::response_parser<http::empty_body> head;
@@ -92,25 +76,13 @@ StationAnswer download(Stream& stream, const Request& request, const std::filesy
   return {200, nullptr, {}};
 }
 
-// SAFETY: another program may have taken the port; it must not get the token.
 template <class Talk>
 StationAnswer talk_in_tls(asio::ip::tcp::socket& socket, const std::filesystem::path& certificate, const Talk& talk) {
   asio::ssl::context context{asio::ssl::context::tls_client};
   asio::ssl::stream<asio::ip::tcp::socket&> stream{socket, context};
   stream.handshake(asio::ssl::stream_base::client);
-  X509* shown = SSL_get0_peer_certificate(stream.native_handle());
-  if (shown == nullptr || tls::describe(*shown).pin != tls::describe(*tls::load_certificate(certificate)).pin) {
-    throw std::runtime_error{fmt::format("its key is not that of '{}'", certificate.string())};
-  }
+  check_certificate(stream.native_handle(), certificate);
   return talk(stream);
-}
-
-Request request_to(const std::string& method, const std::string& target, const std::string& token) {
-  Request request{http::string_to_verb(method), target, 11};
-  request.set(http::field::host, "localhost");
-  request.set(http::field::authorization, "Bearer " + token);
-  request.keep_alive(false);
-  return request;
 }
 
 }  // namespace
@@ -125,8 +97,8 @@ nlohmann::json asked(StationAnswer answer) {
 
 StationClient::StationClient(const std::filesystem::path& data_dir) : token_{token_of(data_dir / "rheonaut.token")} {
   const nlohmann::json announcement = announcement_in(data_dir / "endpoints.json");
-  endpoint_ = endpoint_of(announcement);
-  certificate_ = announcement.value("tls_certificate", "");
+  place_.endpoint = endpoint_of(announcement);
+  place_.certificate = announcement.value("tls_certificate", "");
 }
 
 template <class Talk>
@@ -134,27 +106,22 @@ StationAnswer StationClient::with_connection(const Talk& talk) const {
   try {
     asio::io_context loop;
     asio::ip::tcp::socket socket{loop};
-    socket.connect(endpoint_);
-    return certificate_.empty() ? talk(socket) : talk_in_tls(socket, certificate_, talk);
+    socket.connect(place_.endpoint);
+    return place_.certificate.empty() ? talk(socket) : talk_in_tls(socket, place_.certificate, talk);
   } catch (const std::exception& error) {
     throw std::runtime_error{
-        fmt::format("the station on {} does not answer: {}", config::text(endpoint_), error.what())};
+        fmt::format("the station on {} does not answer: {}", config::text(place_.endpoint), error.what())};
   }
 }
 
 StationAnswer StationClient::ask(const std::string& method, const std::string& target,
                                  const nlohmann::json& body) const {
-  Request request = request_to(method, target, token_);
-  if (!body.is_null()) {
-    request.set(http::field::content_type, "application/json");
-    request.body() = body.dump();
-  }
-  request.prepare_payload();
+  const HttpRequest request = request_to(method, target, token_, body);
   return with_connection([&](auto& stream) { return converse(stream, request); });
 }
 
 void StationClient::save(const std::string& target, const std::filesystem::path& file) const {
-  const Request request = request_to("GET", target, token_);
+  const HttpRequest request = request_to("GET", target, token_, nullptr);
   const storage::Draft part{std::filesystem::path{file}.concat(".part")};
   StationAnswer answer = with_connection([&](auto& stream) { return download(stream, request, part.path()); });
   asked(std::move(answer));

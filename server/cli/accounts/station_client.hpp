@@ -2,18 +2,15 @@
 // the database themselves. In TLS only the station with the certificate that the folder announces gets the token.
 #pragma once
 
-#include <boost/asio/ip/tcp.hpp>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <vector>
+
+#include "server/cli/accounts/station_answer.hpp"
+#include "server/runtime/clock.hpp"
 
 namespace server::cli {
-
-struct StationAnswer {
-  int status = 0;
-  nlohmann::json body;  // of an error: problem details; null of a page
-  std::string text;     // of what is not JSON
-};
 
 // The body of an answer that is a success. Throws std::runtime_error saying what the station refused.
 nlohmann::json asked(StationAnswer answer);
@@ -26,6 +23,10 @@ class StationClient {
   // One connection a request. Throws std::runtime_error when nobody answers in JSON.
   StationAnswer ask(const std::string& method, const std::string& target, const nlohmann::json& body = nullptr) const;
 
+  // All at the same time, each on a connection of its own, so that none waits for the answer to another. An answer that
+  // has not come within `patience` has status 0. Never throws for what the station does.
+  std::vector<StationAnswer> ask_at_once(const std::vector<StationRequest>& requests, microseconds patience) const;
+
   // The body of GET as a file, whatever its size; one that is there is replaced when it is whole. Throws
   // std::runtime_error saying what the station refused, or that it cannot be written.
   void save(const std::string& target, const std::filesystem::path& file) const;
@@ -34,8 +35,7 @@ class StationClient {
   template <class Talk>
   StationAnswer with_connection(const Talk& talk) const;
 
-  boost::asio::ip::tcp::endpoint endpoint_;
-  std::filesystem::path certificate_;  // empty: plain HTTP
+  StationPlace place_;
   std::string token_;
 };
 

@@ -15,6 +15,7 @@
 #include <stdexcept>
 
 #include "server/cli/data/certificate_maker.hpp"
+#include "server/cli/terminal/exit_status.hpp"
 #include "server/cli/terminal/options.hpp"
 #include "server/config/data_folder.hpp"
 #include "server/runtime/private_file.hpp"
@@ -74,14 +75,14 @@ void make_authority_unless_there(const Files& files, std::ostream& out) {
 
 void check(const Certificate& options, const Files& files) {
   for (const std::string& name : options.names) {
-    if (!is_name(name)) throw std::runtime_error{fmt::format("'{}' is neither a host name nor an address", name)};
+    if (!is_name(name)) throw UsageError{fmt::format("'{}' is neither a host name nor an address", name)};
   }
   if (fs::exists(files.certificate) && !options.renew) {
     throw std::runtime_error{
         fmt::format("'{}' is there already; --renew makes a new one with the same key, so that pins stay valid",
                     files.certificate.string())};
   }
-  if (options.new_key && !options.renew) throw std::runtime_error{"--new-key goes with --renew"};
+  if (options.new_key && !options.renew) throw UsageError{"--new-key goes with --renew"};
 }
 
 void print_what_to_do(const Files& files, const tls::TlsCertificate& made, std::ostream& out) {

@@ -7,6 +7,7 @@
 #include <ostream>
 #include <stdexcept>
 
+#include "server/cli/terminal/exit_status.hpp"
 #include "server/cli/terminal/options.hpp"
 #include "server/storage/database/finished_file.hpp"
 #include "server/storage/export/csv_writer.hpp"
@@ -117,11 +118,10 @@ void add_options(CLI::App& command, Export& options) {
 
 int run(const Export& options, std::ostream& out) {
   storage::ExportQuery query{.run = options.run, .channels = storage::all_channels(), .grid_us = options.grid_us};
-  if (options.grid_us && options.format == ExportFormat::sqlite)
-    throw std::runtime_error{"--grid-us is for csv and mat"};
+  if (options.grid_us && options.format == ExportFormat::sqlite) throw UsageError{"--grid-us is for csv and mat"};
   if (!options.channels.empty()) {
     const auto channels = storage::parse_channels(options.channels);
-    if (!channels) throw std::runtime_error{"--" + channels.error().detail};
+    if (!channels) throw UsageError{"--" + channels.error().detail};
     query.channels = *channels;
   }
   PartFile part{options.to};

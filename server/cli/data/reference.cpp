@@ -16,6 +16,7 @@
 #include "server/analysis/run_recording.hpp"
 #include "server/cli/accounts/author.hpp"
 #include "server/cli/accounts/station_client.hpp"
+#include "server/cli/terminal/exit_status.hpp"
 #include "server/cli/terminal/options.hpp"
 #include "server/config/data_folder.hpp"
 #include "server/storage/database/database.hpp"
@@ -96,7 +97,7 @@ analysis::ReferenceClockRequest clock_of(const ReferenceCommand& options) {
     if (read.ec == std::errc{} && read.ptr == end) clock.marker_id = id;
     clock.marker_text = options.marker;
   } else {
-    if (options.clock_sd_s) throw std::runtime_error{"--clock-sd-s belongs to --offset-s, --utc-s or --marker"};
+    if (options.clock_sd_s) throw UsageError{"--clock-sd-s belongs to --offset-s, --utc-s or --marker"};
     clock.search.from_s = options.search_from_s.value_or(clock.search.from_s);
     clock.search.to_s = options.search_to_s.value_or(clock.search.to_s);
   }

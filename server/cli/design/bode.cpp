@@ -6,6 +6,7 @@
 #include <CLI/CLI.hpp>
 
 #include "server/analysis/control_json.hpp"
+#include "server/cli/terminal/exit_status.hpp"
 #include "server/cli/terminal/options.hpp"
 
 namespace server::cli {
@@ -17,7 +18,7 @@ constexpr double kFrom_rad_s = 0.1, kTo_rad_s = 1000;
 std::vector<control::BodePoint> response(const Bode& options, const control::OpenLoop& loop, int points) {
   const double from_rad_s = options.from_rad_s.value_or(kFrom_rad_s), to_rad_s = options.to_rad_s.value_or(kTo_rad_s);
   if (!(to_rad_s > from_rad_s)) {
-    throw std::invalid_argument{fmt::format("--to-rad-s {} must lie above --from-rad-s {}", to_rad_s, from_rad_s)};
+    throw UsageError{fmt::format("--to-rad-s {} must lie above --from-rad-s {}", to_rad_s, from_rad_s)};
   }
   return control::bode(loop, control::log_spaced(from_rad_s, to_rad_s, points));
 }
@@ -85,7 +86,7 @@ int run(const Bode& options, std::ostream& out) {
   const control::Margins margins = control::margins(loop);
   if (options.form.is_json) {
     if (!options.points && (options.from_rad_s || options.to_rad_s)) {
-      throw std::invalid_argument{"--from-rad-s and --to-rad-s belong to the response, which --json has with --points"};
+      throw UsageError{"--from-rad-s and --to-rad-s belong to the response, which --json has with --points"};
     }
     analysis::OrderedJson answer = analysis::json_of(margins);
     answer["plant"] = analysis::json_of(loop.plant);

@@ -17,6 +17,7 @@
 #include <vector>
 
 #include "server/analysis/identification_answer.hpp"
+#include "server/cli/terminal/exit_status.hpp"
 #include "server/cli/terminal/options.hpp"
 
 namespace server::cli {
@@ -113,12 +114,12 @@ std::optional<Value> value_for(const std::vector<Value>& given, std::size_t run)
 
 void check_counts(const Identify& options) {
   if (options.runs.size() > control::kMostRecordings) {
-    throw std::runtime_error{fmt::format("identify fits at most {} runs together", control::kMostRecordings)};
+    throw UsageError{fmt::format("identify fits at most {} runs together", control::kMostRecordings)};
   }
   const auto check = [&](const char* flag, std::size_t given) {
     if (given <= 1 || given == options.runs.size()) return;
-    throw std::runtime_error{fmt::format("{} is given {} times, --run {} times: give it once, or once for each run",
-                                         flag, given, options.runs.size())};
+    throw UsageError{fmt::format("{} is given {} times, --run {} times: give it once, or once for each run", flag,
+                                 given, options.runs.size())};
   };
   check("--span", options.spans.size());
   check("--from-s", options.from_s.size());
@@ -140,7 +141,7 @@ analysis::RunOfMany run_for(const Identify& options, std::size_t index) {
 std::vector<analysis::RunOfMany> recordings_for(const Identify& options) {
   if (options.csv) return {{0, read_recording(*options.csv, options.with_velocity)}};
   if (options.runs.empty()) {
-    throw std::runtime_error{"identify needs a recording: give --csv FILE or --run ID (or --plan for a forecast)"};
+    throw UsageError{"identify needs a recording: give --csv FILE or --run ID (or --plan for a forecast)"};
   }
   check_counts(options);
   std::vector<analysis::RunOfMany> runs;

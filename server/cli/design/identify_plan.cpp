@@ -7,6 +7,7 @@
 
 #include "server/analysis/control_json.hpp"
 #include "server/cli/design/identify.hpp"
+#include "server/cli/terminal/exit_status.hpp"
 
 namespace server::cli {
 namespace {
@@ -15,8 +16,8 @@ constexpr double kMaxSamples = 200'000;
 
 control::PlannedExperiment experiment_of(const Plan& plan, bool fits_offset) {
   if (!(plan.duration_s / plan.dt_s <= kMaxSamples)) {
-    throw std::invalid_argument{fmt::format("--plan-duration-s {} at --plan-dt-s {} has more than {} samples",
-                                            plan.duration_s, plan.dt_s, kMaxSamples)};
+    throw UsageError{fmt::format("--plan-duration-s {} at --plan-dt-s {} has more than {} samples", plan.duration_s,
+                                 plan.dt_s, kMaxSamples)};
   }
   control::PlannedExperiment experiment;
   experiment.dt_s = plan.dt_s;

@@ -11,6 +11,7 @@
 
 #include "server/analysis/control_json.hpp"
 #include "server/analysis/optional_json.hpp"
+#include "server/cli/terminal/exit_status.hpp"
 #include "server/cli/terminal/options.hpp"
 #include "server/experiments/preview_band.hpp"
 #include "server/experiments/profile_document.hpp"
@@ -199,7 +200,7 @@ int print_text(const std::string& name, std::ostream& out) {
     out << shipped.content;
     return 0;
   }
-  throw std::invalid_argument{fmt::format("--text prints a profile that comes with the program; '{}' is none", name)};
+  throw UsageError{fmt::format("--text prints a profile that comes with the program; '{}' is none", name)};
 }
 
 }  // namespace
@@ -228,7 +229,7 @@ int run(const ProfileQuestion& options, std::ostream& out) {
   const Profile profile = experiments::find_profile(*options.profile);
   const std::vector<Predicted> runs = predict(profile, options);
   if (options.run > runs.size()) {
-    throw std::invalid_argument{fmt::format("--run {}: the profile has {} runs", options.run, runs.size())};
+    throw UsageError{fmt::format("--run {}: the profile has {} runs", options.run, runs.size())};
   }
   const Predicted& chosen = runs[options.run - 1];
   if (options.form.is_csv) {

@@ -8,6 +8,7 @@
 #include "control/responses/margins.hpp"
 #include "control/responses/time_response.hpp"
 #include "server/analysis/control_json.hpp"
+#include "server/cli/terminal/exit_status.hpp"
 #include "server/cli/terminal/options.hpp"
 
 namespace server::cli {
@@ -23,8 +24,8 @@ std::vector<double> times_of(const Step& options) {
     return control::log_spaced(std::min(kFirstTime_s, options.until_s / 2), options.until_s, kLogSpacedTimes);
   const double count = std::floor(options.until_s / *options.every_s * (1 + 1e-12)) + 1;
   if (!(count <= kMaxTimes)) {
-    throw std::invalid_argument{fmt::format("--every-s {} up to --until-s {} makes {} times; at most {} are allowed",
-                                            *options.every_s, options.until_s, count, kMaxTimes)};
+    throw UsageError{fmt::format("--every-s {} up to --until-s {} makes {} times; at most {} are allowed",
+                                 *options.every_s, options.until_s, count, kMaxTimes)};
   }
   std::vector<double> times_s;
   times_s.reserve(static_cast<std::size_t>(count));

@@ -44,7 +44,9 @@ CLI::Option* add_word(CLI::App& command, const char* name, Target& target, std::
       name,
       [&target, values, find](const std::string& word) { target = values.at(static_cast<std::size_t>(find(word))); },
       help);
-  option->check(CLI::Validator{refuse, ""});
+  std::vector<std::string> words;
+  for (const T value : values) words.emplace_back(text(value));
+  option->check(CLI::Validator{refuse, fmt::format("{{{}}}", fmt::join(words, ","))});  // as CLI::IsMember describes it
   return option;
 }
 

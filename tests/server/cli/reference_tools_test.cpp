@@ -229,8 +229,8 @@ TEST_F(ReferenceTools, WhatIsWrongIsOneLine) {
   EXPECT_THAT(ask("reference import --run 1 --csv @camera.csv").error, HasSubstr("--sd-mm"));
   EXPECT_THAT(ask("reference import --run 1 --csv @camera.csv --sd-mm 1 --marker flash --at-s 1").error,
               HasSubstr("run 1 has no marker 'flash'"));
-  EXPECT_GT(ask("reference import --run 1 --csv @camera.csv --marker flash").exit_code, 100);
-  EXPECT_GT(ask("reference import --run 1 --csv @camera.csv --offset-s 1 --utc-s 1").exit_code, 100);
+  EXPECT_EQ(ask("reference import --run 1 --csv @camera.csv --marker flash").exit_code, 2);
+  EXPECT_EQ(ask("reference import --run 1 --csv @camera.csv --offset-s 1 --utc-s 1").exit_code, 2);
 }
 
 }  // namespace

@@ -1,0 +1,29 @@
+// A request to the station, its answer, and where it goes: values without HTTP.
+#pragma once
+
+#include <boost/asio/ip/tcp.hpp>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <string>
+
+namespace server::cli {
+
+struct StationRequest {
+  std::string method;
+  std::string target;
+  nlohmann::json body = nullptr;
+};
+
+struct StationAnswer {
+  int status = 0;       // 0: there is no answer
+  nlohmann::json body;  // of an error: problem details; null of a page
+  std::string text;     // of what is not JSON; without an answer, why
+};
+
+// Where the station listens.
+struct StationPlace {
+  boost::asio::ip::tcp::endpoint endpoint;
+  std::filesystem::path certificate;  // empty: plain HTTP
+};
+
+}  // namespace server::cli

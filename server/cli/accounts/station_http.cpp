@@ -1,0 +1,46 @@
+// By Beast and OpenSSL.
+#include "server/cli/accounts/station_http.hpp"
+
+#include <fmt/format.h>
+
+#include <stdexcept>
+
+#include "server/tls/tls_certificate.hpp"
+
+namespace server::cli {
+namespace http = boost::beast::http;
+
+StationAnswer answer_of(http::response<http::string_body> response) {
+  StationAnswer answer;
+  answer.status = static_cast<int>(response.result_int());
+  if (response[http::field::content_type].contains("json")) {
+    answer.body = nlohmann::json::parse(response.body());
+  } else {
+    answer.text = std::move(response.body());
+  }
+  return answer;
+}
+
+// SAFETY: another program may have taken the port; it must not get the token.
+void check_certificate(const SSL* connection, const std::filesystem::path& certificate) {
+  X509* shown = SSL_get0_peer_certificate(connection);
+  if (shown == nullptr || tls::describe(*shown).pin != tls::describe(*tls::load_certificate(certificate)).pin) {
+    throw std::runtime_error{fmt::format("its key is not that of '{}'", certificate.string())};
+  }
+}
+
+HttpRequest request_to(const std::string& method, const std::string& target, const std::string& token,
+                       const nlohmann::json& body) {
+  HttpRequest request{http::string_to_verb(method), target, 11};
+  request.set(http::field::host, "localhost");
+  request.set(http::field::authorization, "Bearer " + token);
+  request.keep_alive(false);
+  if (!body.is_null()) {
+    request.set(http::field::content_type, "application/json");
+    request.body() = body.dump();
+  }
+  request.prepare_payload();
+  return request;
+}
+
+}  // namespace server::cli

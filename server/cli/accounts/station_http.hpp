@@ -1,0 +1,26 @@
+// What a request to the station and its answer are in HTTP, for StationClient alone.
+#pragma once
+
+#include <openssl/ssl.h>
+
+#include <boost/beast/http.hpp>
+
+#include "server/cli/accounts/station_answer.hpp"
+
+namespace server::cli {
+
+using HttpRequest = boost::beast::http::request<boost::beast::http::string_body>;
+
+inline constexpr std::uint64_t kMaxAnswerBytes = 2'000'000'000;  // of an archive of hours
+
+// With the station's token; null: without a body.
+HttpRequest request_to(const std::string& method, const std::string& target, const std::string& token,
+                       const nlohmann::json& body);
+
+// Throws nlohmann::json::exception for a body that is not what its header says.
+StationAnswer answer_of(boost::beast::http::response<boost::beast::http::string_body> response);
+
+// Throws std::runtime_error unless the other end of the connection has the key of this certificate.
+void check_certificate(const SSL* connection, const std::filesystem::path& certificate);
+
+}  // namespace server::cli

@@ -1,0 +1,184 @@
+// One request for each robot, all at once, or one for all robots: each in the station's own lane for stops.
+#include "server/cli/robots/stop.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ostream.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <stdexcept>
+
+#include "server/cli/accounts/station_client.hpp"
+#include "server/cli/terminal/options.hpp"
+
+namespace server::cli {
+namespace {
+
+using nlohmann::json;
+
+// SAFETY: longer than the station itself waits for a robot (1.5 s), so that its answer is never missed; and an end, so
+// that the person is told to use another switch while there is time.
+constexpr microseconds kStopPatience{5'000'000};
+
+constexpr microseconds kExplanationPatience{1'000'000};
+constexpr std::size_t kMostExplained = 20;  // connections at once
+
+constexpr const char* kNothingStopped = "{}; NOTHING WAS STOPPED by this command: switch the robots off by hand";
+
+// What became of the stop of one robot.
+struct StopOutcome {
+  std::string robot_id;
+  bool is_confirmed = false;
+  json record;                                                // of the command; null when there is none
+  std::string why = "it has not answered; the stop is kept";  // of one that is not confirmed
+};
+
+// SAFETY: only what the robot itself has acknowledged counts as a stop; sent or queued is not enough.
+bool is_confirmed(const json& record) {
+  const auto state = record.at("state").get<std::string>();
+  return state == "acknowledged" || state == "verified";
+}
+
+StopOutcome outcome_of(std::string robot_id, const json& record) {
+  return {std::move(robot_id), is_confirmed(record), record};
+}
+
+// Why a robot whose stop the station holds has not confirmed it. Asked when nothing waits for the answer any more.
+void explain(const StationClient& station, std::vector<StopOutcome>& outcomes) {
+  std::vector<StopOutcome*> open;
+  std::vector<StationRequest> requests;
+  for (StopOutcome& one : outcomes) {
+    if (one.is_confirmed || !one.record.is_object() || open.size() == kMostExplained) continue;
+    open.push_back(&one);
+    requests.push_back({"GET", "/api/v1/robots/" + one.robot_id});
+  }
+  const std::vector<StationAnswer> answers = station.ask_at_once(requests, kExplanationPatience);
+  for (std::size_t i = 0; i < open.size(); ++i) {
+    const json& robot = answers[i].body;
+    const bool is_known = robot.is_object() && robot.contains("link");
+    open[i]->why = is_known && robot.at("link") != "connected"
+                       ? "it is not connected; the stop is kept and is sent first when it connects"
+                       : "it has not answered; the stop is repeated each second";
+  }
+}
+
+std::string refusal_in(const StationAnswer& answer) {
+  if (answer.status == 0) return answer.text;
+  const std::string detail = answer.body.is_object() ? answer.body.value("detail", std::string{}) : std::string{};
+  return fmt::format("the station refused: {}", detail.empty() ? fmt::format("status {}", answer.status) : detail);
+}
+
+std::vector<StopOutcome> stop_each(const StationClient& station, std::vector<std::string> robots) {
+  std::ranges::sort(robots);
+  robots.erase(std::ranges::unique(robots).begin(), robots.end());
+  std::vector<StationRequest> requests;
+  for (const std::string& id : robots) requests.push_back({"POST", "/api/v1/robots/" + id + "/emergency-stop"});
+  const std::vector<StationAnswer> answers = station.ask_at_once(requests, kStopPatience);
+  const auto is_silent = [](const StationAnswer& answer) { return answer.status == 0; };
+  if (std::ranges::all_of(answers, is_silent)) {
+    throw std::runtime_error{fmt::format(kNothingStopped, answers.front().text)};
+  }
+  std::vector<StopOutcome> outcomes;
+  for (std::size_t i = 0; i < robots.size(); ++i) {
+    const json& body = answers[i].body;
+    if (body.is_object() && body.contains("state")) {
+      outcomes.push_back(outcome_of(robots[i], body));
+    } else {
+      outcomes.push_back({robots[i], false, nullptr, refusal_in(answers[i])});
+    }
+  }
+  return outcomes;
+}
+
+std::vector<StopOutcome> stop_all(const StationClient& station) {
+  const StationAnswer answer = station.ask_at_once({{"POST", "/api/v1/emergency-stop"}}, kStopPatience).front();
+  if (!answer.body.is_object() || !answer.body.contains("commands")) {
+    throw std::runtime_error{fmt::format(kNothingStopped, refusal_in(answer))};
+  }
+  std::vector<StopOutcome> outcomes;
+  for (const json& record : answer.body.at("commands")) {
+    outcomes.push_back(outcome_of(record.at("robot_id").get<std::string>(), record));
+  }
+  for (const json& one : answer.body.at("summary").at("not_acknowledged")) {
+    if (one.at("outcome") != "failed") continue;
+    outcomes.push_back({one.at("robot_id").get<std::string>(), false, nullptr, "the station failed; its log says why"});
+  }
+  return outcomes;
+}
+
+void write_as_json(std::ostream& out, const std::vector<StopOutcome>& outcomes, std::int64_t answered_after_us) {
+  nlohmann::ordered_json answer;
+  answer["confirmed"] = std::ranges::count_if(outcomes, &StopOutcome::is_confirmed);
+  answer["not_confirmed"] = std::ranges::count_if(outcomes, [](const auto& one) { return !one.is_confirmed; });
+  answer["answered_after_us"] = answered_after_us;
+  answer["robots"] = nlohmann::ordered_json::array();
+  for (const StopOutcome& one : outcomes) {
+    nlohmann::ordered_json robot{{"robot_id", one.robot_id}, {"confirmed", one.is_confirmed}};
+    for (const char* name : {"state", "acknowledged_after_us", "emergency_id", "command_id"}) {
+      robot[name] = one.record.is_object() ? one.record.value(name, json()) : json();
+    }
+    robot["detail"] = one.is_confirmed ? json() : json(one.why);
+    answer["robots"].push_back(robot);
+  }
+  write_json(out, answer);
+}
+
+// Those that are not confirmed come last, where the person looks first.
+void write_as_text(std::ostream& out, std::vector<StopOutcome> outcomes, std::int64_t answered_after_us) {
+  constexpr double kUsPerMs = 1000;
+  std::ranges::sort(outcomes, {}, [](const StopOutcome& one) { return std::pair{!one.is_confirmed, one.robot_id}; });
+  std::size_t width = 0;
+  for (const StopOutcome& one : outcomes) width = std::max(width, one.robot_id.size());
+  for (const StopOutcome& one : outcomes) {
+    const std::string said = one.is_confirmed
+                                 ? fmt::format("stopped: the robot confirmed after {:.1f} ms",
+                                               one.record.at("acknowledged_after_us").get<double>() / kUsPerMs)
+                                 : "NOT CONFIRMED: " + one_line(one.why);
+    fmt::print(out, "{:<{}}  {}\n", one_line(one.robot_id), width, said);
+  }
+  fmt::print(out, "{} of {} robots confirmed; the station answered after {:.0f} ms\n",
+             std::ranges::count_if(outcomes, &StopOutcome::is_confirmed), outcomes.size(),
+             static_cast<double>(answered_after_us) / kUsPerMs);
+}
+
+StationClient client_of(const std::filesystem::path& data_dir) {
+  try {
+    return StationClient{data_dir};
+  } catch (const std::exception& error) {
+    throw std::runtime_error{fmt::format(kNothingStopped, error.what())};
+  }
+}
+
+}  // namespace
+
+void add_options(CLI::App& command, StopCommand& options) {
+  CLI::Option* robots =
+      command.add_option("robot_id", options.robots, "The robots; without any, all robots of the station")
+          ->check(named());
+  command.add_flag("--all", options.is_all, "All robots of the station")->excludes(robots);
+  command.add_option("--data", options.data_dir, "Folder of the station (default: rheonaut-data)")->check(named());
+  add_json_flag(command, options.form);
+  command.footer(
+      "The motor stays off until somebody resets the emergency (clear_emergency). Everybody may stop.\n"
+      "Exit status 5: a robot has not confirmed; 1: the station does not answer, nothing was stopped.\n"
+      "Example: rheonaut stop --data lab\n"
+      "Example: rheonaut stop sim-1 sim-2 --data lab");
+}
+
+int run(const StopCommand& options, std::ostream& out) {
+  boost::asio::io_context clocks_loop;
+  const runtime::SystemClock clock{clocks_loop};
+  const std::int64_t begun_us = clock.steady_us();
+  const StationClient station = client_of(options.data_dir);
+  std::vector<StopOutcome> outcomes = options.robots.empty() ? stop_all(station) : stop_each(station, options.robots);
+  const std::int64_t answered_after_us = clock.steady_us() - begun_us;
+  explain(station, outcomes);
+  if (options.form.is_json) {
+    write_as_json(out, outcomes, answered_after_us);
+  } else {
+    write_as_text(out, outcomes, answered_after_us);
+  }
+  return std::ranges::all_of(outcomes, &StopOutcome::is_confirmed) ? 0 : kNotConfirmed;
+}
+
+}  // namespace server::cli

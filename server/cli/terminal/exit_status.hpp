@@ -1,0 +1,39 @@
+// What the exit status of a command means: the one table, which the manual pages print and docs/commands.md repeats.
+#pragma once
+
+#include <stdexcept>
+
+namespace server::cli {
+
+struct ExitStatus {
+  int code;
+  const char* meaning;
+};
+
+inline constexpr int kFailed = 1;
+
+inline constexpr ExitStatus kExitStatuses[] = {
+    {0, "done"},
+    {kFailed,
+     "an error, with one line on standard error; verify: faults were found; reproduce: a file is damaged or a number "
+     "differs"},
+    {2,
+     "the command line is wrong: an unknown command or option, a value that is not allowed, options that exclude each "
+     "other; verify, reproduce: the file is not what the command reads"},
+    {3,
+     "tune, autotune: no controller meets the specification; estimator: the robot cannot use a model of this plant; "
+     "profile: a predicted run leaves the limits"},
+    {4, "identify: the search did not converge, or its result is not finite; the best result is printed"},
+    {5,
+     "not confirmed, or it did not end well: stop: a robot has not confirmed; robot parameters, robot controller: "
+     "accepted, but not reported back; job, experiment: failed, cancelled, aborted or interrupted; autotune: a stage "
+     "did not end well"},
+};
+
+// Options that do not go together, or a value that another option makes impossible: exit status 2.
+class UsageError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+}  // namespace server::cli

@@ -1,0 +1,171 @@
+#!/usr/bin/env python3
+"""Goes over every command of `rheonaut`: --help, completion, manual pages, exit status of mistakes, suggestions."""
+import os
+import pathlib
+import re
+import shutil
+import subprocess
+import tempfile
+import unittest
+
+ROOT = pathlib.Path(__file__).parents[3]
+BIN = pathlib.Path(os.environ["RHEONAUT_BIN"])
+ROFF_REQUESTS = {"TH", "SH", "SS", "TP", "PP", "EX", "EE"}
+
+
+def run(*words, program="rheonaut", **others):
+    return subprocess.run([str(BIN / program), *words], capture_output=True, text=True, timeout=120,
+                          stdin=subprocess.DEVNULL, **others)
+
+
+def sections(help_text):
+    """{heading: [(first word, the rest)]} of a --help."""
+    found, heading = {}, None
+    for line in help_text.splitlines():
+        if re.fullmatch(r"\S.*:", line) and not line.startswith(("Usage:", "Example:")):
+            heading = line[:-1]
+            found[heading] = []
+        elif heading and re.match(r"  \S", line):
+            found[heading].append(line.strip())
+        elif not line.startswith(" "):
+            heading = None
+    return found
+
+
+class Command:
+    """One command by its words, with what its --help says."""
+
+    def __init__(self, words):
+        self.words = words
+        self.help = run(*words, "--help").stdout
+        self.usage = re.search("(?m)^Usage: .*$", self.help).group()
+        headings = sections(self.help)
+        self.options, self.values, self.commands = [], {}, []
+        for heading, lines in headings.items():
+            for line in lines:
+                if line.startswith("-"):
+                    names = re.match(r"((?:--?[a-z0-9-]+(?:, )?)+)(?: (\S+))?", line)
+                    for name in names.group(1).strip(", ").split(", "):
+                        self.options.append(name)
+                        if names.group(2) and "|" in names.group(2):
+                            self.values[name] = names.group(2).split("|")
+                elif heading != "Arguments" and " COMMAND" in self.usage:
+                    self.commands.append(line.split()[0])
+
+
+def every_command(words=()):
+    command = Command(words)
+    yield command
+    for name in command.commands:
+        yield from every_command((*words, name))
+
+
+COMMANDS = list(every_command())
+
+
+class CommandLineTest(unittest.TestCase):
+    def test_help_is_grouped_has_examples_and_names_the_program(self):
+        self.assertGreater(len(COMMANDS), 60)
+        headings = sections(COMMANDS[0].help)
+        for heading in ("Running a station", "Robots", "Recordings", "Models and controllers", "Experiments", "Accounts"):
+            self.assertIn(heading, headings)
+        self.assertNotIn("Commands", headings, "every command of the program has a group")
+        for command in COMMANDS:
+            with self.subTest(command=command.words):
+                self.assertTrue(command.usage.startswith(" ".join(("Usage: rheonaut", *command.words))))
+                if len(command.words) < 2:
+                    self.assertRegex(command.help, r"(?m)^Example: rheonaut")
+                for line in command.help.splitlines():
+                    known = line.startswith(("Example: ", "Usage: ")) or '{"kp"' in line
+                    self.assertTrue(known or len(line) <= 80, line)
+
+    def test_a_mistake_is_exit_status_2_with_a_suggestion(self):
+        for command in COMMANDS:
+            with self.subTest(command=command.words):
+                done = run(*command.words, "--nonsense")
+                self.assertEqual((done.returncode, done.stdout), (2, ""), done)
+                self.assertRegex(done.stderr, r"^rheonaut: [^\n]*--nonsense[^\n]*see rheonaut[^\n]* --help\n$")
+        for words, suggestion in ((["srve"], "serve"), (["robot", "paramters"], "parameters"),
+                                  (["identify", "--cvs", "x"], "--csv"), (["man", "stpo"], "stop")):
+            done = run(*words)
+            self.assertEqual(done.returncode, 2)
+            self.assertIn(f", did you mean {suggestion}?", done.stderr)
+        self.assertNotIn("did you mean", run("xyzzy").stderr)
+        self.assertEqual(run().returncode, 2)
+        self.assertEqual(run("nonsense", program="rheonaut-sim").returncode, 2)
+
+    def test_exit_statuses_of_the_manual_are_those_of_the_documents(self):
+        page = run("man").stdout
+        manual = re.findall(r"\.TP\n\\fB(\d)\\fR\n(.*)\n", page[page.index(".SH EXIT STATUS"):])
+        document = re.findall(r"(?m)^\| (\d) \| (.*) \|$", (ROOT / "docs/commands.md").read_text())
+        self.assertEqual([code for code, _ in manual], list("012345"))
+        said = [(code, meaning.replace("\\-", "-").replace("\\(aq", "'")) for code, meaning in manual]
+        self.assertEqual(said, [(code, meaning.replace("`", "")) for code, meaning in document])
+
+    def check_page(self, page, name):
+        self.assertTrue(page.startswith(f'.TH {name.upper()} 1 "" '.replace("-", "\\-")), page[:80])
+        for line in page.splitlines():
+            if line.startswith("."):
+                self.assertIn(line[1:].split()[0], ROFF_REQUESTS, line)
+            self.assertFalse(line.startswith("'"), line)
+            self.assertTrue(line.isascii(), line)
+            self.assertRegex(re.sub(r"\\(e|-|&|f[BIR]|\((aq|ga|ha|ti)|\[u[0-9A-F]{4,6}\])", "", line), r"^[^\\]*$")
+        if shutil.which("man") and shutil.which("groff"):
+            done = subprocess.run(["man", "-l", "--warnings", "-Tutf8", "-"], input=page, capture_output=True, text=True,
+                                  env=dict(os.environ, MANWIDTH="80", LC_ALL="C.UTF-8"), timeout=60)
+            self.assertEqual((done.returncode, done.stderr), (0, ""))
+            self.assertIn("EXIT STATUS", re.sub(".\x08", "", done.stdout))
+
+    def test_manual_pages_have_every_command_and_option(self):
+        names = run("man", "--list").stdout.split()
+        self.assertEqual(sorted(names), sorted(["rheonaut", *(f"rheonaut-{command.words[0]}" for command in COMMANDS
+                                                              if len(command.words) == 1)]))
+        for name in names:
+            with self.subTest(page=name):
+                page = run("man", *([name] if name != "rheonaut" else [])).stdout
+                self.check_page(page, name)
+                own = name.partition("-")[2]
+                for command in COMMANDS:
+                    if command.words[:1] == ((own,) if own else ()):
+                        for option in command.options:
+                            self.assertIn(rf"\fB{option}\fR".replace("-", "\\-"), page, command.words)
+        self.assertEqual(run("man", "stop").stdout, run("man", "rheonaut-stop").stdout)
+        self.check_page(run("--man", program="rheonaut-sim").stdout, "rheonaut-sim")
+
+    def bash_offers(self, folder, *words, program="rheonaut"):
+        script = (f"source {folder}/{program}; COMP_WORDS=({program} \"$@\"); COMP_CWORD=$#; "
+                  f"_{program.replace('-', '_')}; printf '%s\\n' \"${{COMPREPLY[@]}}\"")
+        done = subprocess.run(["bash", "--norc", "-c", script, "bash", *words], capture_output=True, text=True, timeout=60)
+        self.assertEqual(done.stderr, "")
+        return done.stdout.split()
+
+    def test_bash_completes_every_command_option_and_word(self):
+        with tempfile.TemporaryDirectory() as folder:
+            pathlib.Path(folder, "rheonaut").write_text(run("completion", "bash").stdout)
+            for command in COMMANDS:
+                with self.subTest(command=command.words):
+                    self.assertEqual(sorted(self.bash_offers(folder, *command.words, "-")), sorted(command.options))
+                    if command.commands:
+                        self.assertEqual(sorted(self.bash_offers(folder, *command.words, "")), sorted(command.commands))
+                    for option, words in command.values.items():
+                        self.assertEqual(self.bash_offers(folder, *command.words, option, ""), words)
+            self.assertEqual(self.bash_offers(folder, "sto"), ["stop"])
+            self.assertEqual(self.bash_offers(folder, "robot", "--data", "x", "par"), ["parameters"])
+            self.assertEqual(self.bash_offers(folder, "export", "--data", ""), [], "files, by bash itself")
+            self.assertEqual(self.bash_offers(folder, "completion", "z"), ["zsh"])
+            pathlib.Path(folder, "rheonaut-sim").write_text(run("--completion", "bash", program="rheonaut-sim").stdout)
+            self.assertIn("--scenario", self.bash_offers(folder, "--sc", program="rheonaut-sim"))
+
+    def test_zsh_and_fish_read_their_scripts(self):
+        for shell in ("zsh", "fish"):
+            script = run("completion", shell).stdout
+            for command in COMMANDS:
+                for option in command.options:
+                    self.assertIn(option if shell == "zsh" else re.sub("^--?", "", option), script)
+            if shutil.which(shell):  # CI has neither
+                done = subprocess.run([shell, "-n"], input=script, capture_output=True, text=True, timeout=60)
+                self.assertEqual((done.returncode, done.stderr), (0, ""))
+
+
+if __name__ == "__main__":
+    unittest.main()

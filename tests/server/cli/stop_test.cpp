@@ -1,0 +1,86 @@
+// `rheonaut stop` against a station of the test, which answers as it likes.
+#include <gmock/gmock.h>
+
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/read_until.hpp>
+#include <boost/asio/write.hpp>
+#include <thread>
+
+#include "tests/server/cli/tool_test.hpp"
+
+namespace server::cli {
+namespace {
+
+namespace asio = boost::asio;
+using asio::ip::tcp;
+
+// Answers nothing before as many requests have come as it expects; then all, the last one first.
+class SlowStation {
+ public:
+  SlowStation(const std::filesystem::path& data_dir, std::vector<std::string> answers) : answers_{std::move(answers)} {
+    std::filesystem::create_directories(data_dir);
+    std::ofstream{data_dir / "rheonaut.token"} << "secret\n";
+    std::ofstream{data_dir / "endpoints.json"}
+        << nlohmann::json{{"http", "127.0.0.1:" + std::to_string(acceptor_.local_endpoint().port())}};
+    thread_ = std::thread{[this] { serve(); }};
+  }
+  ~SlowStation() { thread_.join(); }
+  SlowStation(const SlowStation&) = delete;
+  SlowStation& operator=(const SlowStation&) = delete;
+
+ private:
+  void serve() {
+    std::vector<tcp::socket> open;
+    while (open.size() < answers_.size()) {
+      open.push_back(acceptor_.accept());
+      std::string request;
+      asio::read_until(open.back(), asio::dynamic_buffer(request), "\r\n\r\n");
+    }
+    for (std::size_t i = open.size(); i-- > 0;) {
+      const std::string text =
+          "HTTP/1.1 200 OK\r\nContent-Type: application/json\r\nContent-Length: " + std::to_string(answers_[i].size()) +
+          "\r\n\r\n" + answers_[i];
+      asio::write(open[i], asio::buffer(text));
+    }
+  }
+
+  std::vector<std::string> answers_;
+  asio::io_context loop_;
+  tcp::acceptor acceptor_{loop_, {asio::ip::address_v4::loopback(), 0}};
+  std::thread thread_;
+};
+
+std::string confirmed(const std::string& robot_id) {
+  return nlohmann::json{{"robot_id", robot_id}, {"state", "acknowledged"}, {"acknowledged_after_us", 1500}}.dump();
+}
+
+using StopTool = ToolTest;
+
+// SAFETY: no robot waits until another has answered; one after the other these two would wait for ever.
+TEST_F(StopTool, AllRequestsAreOnTheirWayBeforeAnyAnswer) {
+  const SlowStation station{folder_ / "data", {confirmed("a"), confirmed("b")}};
+  const Answer answer = ask("stop a b --data @data");
+  EXPECT_EQ(answer.exit_code, 0) << answer.error;
+  EXPECT_THAT(answer.text, ::testing::HasSubstr("a  stopped: the robot confirmed after 1.5 ms\n"));
+  EXPECT_THAT(answer.text, ::testing::HasSubstr("b  stopped: the robot confirmed after 1.5 ms\n"));
+}
+
+// SAFETY: what was only sent is not a stop.
+TEST_F(StopTool, WhatTheRobotHasNotAcknowledgedIsNotConfirmed) {
+  const std::string sent = R"({"robot_id":"a","state":"sent","acknowledged_after_us":null})";
+  const SlowStation station{folder_ / "data", {sent}};
+  const Answer answer = ask("stop a --data @data --json");
+  EXPECT_EQ(answer.exit_code, 5);
+  EXPECT_EQ(answer.json()["not_confirmed"], 1);
+  EXPECT_FALSE(answer.json()["robots"][0]["confirmed"].get<bool>());
+}
+
+TEST_F(StopTool, WithoutAStationItSaysThatNothingWasStopped) {
+  const Answer answer = ask("stop --data @nowhere");
+  EXPECT_EQ(answer.exit_code, 1);
+  EXPECT_THAT(answer.error, ::testing::HasSubstr("NOTHING WAS STOPPED"));
+  EXPECT_GT(ask("stop a --all").exit_code, 1);
+}
+
+}  // namespace
+}  // namespace server::cli
