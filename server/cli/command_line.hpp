@@ -35,6 +35,7 @@
 #include "server/cli/experiments/experiment.hpp"
 #include "server/cli/reference_pages.hpp"
 #include "server/cli/robots/stop.hpp"
+#include "server/cli/robots/watch.hpp"
 #include "server/config/config.hpp"
 
 namespace server::cli {
@@ -57,7 +58,7 @@ using CommandLine =
                  Identify, EstimatorQuestion, Tune, Discretise, Predict, UserCommand, TokenCommand, RobotCommand,
                  FluidCommand, JobCommand, DesignCommand, MetricsQuestion, CompareQuestion, ImpedanceMapQuestion,
                  ReportQuestion, CapsuleQuestion, Reproduce, ReferenceCommand, ProfileQuestion, ExperimentCommand,
-                 Autotune, StopCommand, CompletionCommand, ManualCommand>;
+                 Autotune, StopCommand, WatchCommand, CompletionCommand, ManualCommand>;
 
 // The program with all its commands; the one that is chosen when `app` parses becomes `line`.
 void define_command_line(CLI::App& app, CommandLine& line);
