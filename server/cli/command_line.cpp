@@ -54,7 +54,7 @@ void offer(CLI::App& app, const char* name, const char* purpose, CommandLine& li
 // The headings of --help, in its order, and their commands.
 const std::vector<std::pair<const char*, std::vector<std::string_view>>> kGroups{
     {"Running a station", {"serve", "demo", "check-config", "certificate", "backup", "restore", "verify"}},
-    {"Robots", {"stop", "robot", "fluid"}},
+    {"Robots", {"stop", "watch", "robot", "fluid"}},
     {"Experiments", {"profile", "experiment", "autotune"}},
     {"Recordings",
      {"export", "reference", "metrics", "compare", "impedance-map", "report", "capsule", "reproduce", "job"}},
@@ -109,6 +109,7 @@ void define_command_line(CLI::App& app, CommandLine& line) {
   offer<Serve>(app, "serve", "Run the station until SIGINT or SIGTERM", line);
   offer<Demo>(app, "demo", "Start a station and a simulated robot, and perform the paper's Figure 7", line);
   offer<StopCommand>(app, "stop", "Emergency stop of robots, or of all robots", line);
+  offer<WatchCommand>(app, "watch", "Show the robots live in the terminal", line);
   offer<CheckConfig>(app, "check-config", "Check a configuration and print what it means", line);
   offer<Certificate>(app, "certificate", "Make or renew the station's certificate for TLS", line);
   offer<Backup>(app, "backup", "Copy a station's database, also while it runs, and verify the copy", line);

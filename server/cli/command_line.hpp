@@ -36,6 +36,7 @@
 #include "server/cli/experiments/experiment.hpp"
 #include "server/cli/reference_pages.hpp"
 #include "server/cli/robots/stop.hpp"
+#include "server/cli/robots/watch.hpp"
 #include "server/config/config.hpp"
 
 namespace server::cli {
@@ -58,7 +59,7 @@ using CommandLine =
                  Identify, EstimatorQuestion, Tune, Discretise, Predict, UserCommand, TokenCommand, RobotCommand,
                  FluidCommand, JobCommand, DesignCommand, MetricsQuestion, CompareQuestion, ImpedanceMapQuestion,
                  ReportQuestion, CapsuleQuestion, Reproduce, ReferenceCommand, ProfileQuestion, ExperimentCommand,
-                 Autotune, Demo, StopCommand, CompletionCommand, ManualCommand>;
+                 Autotune, Demo, StopCommand, WatchCommand, CompletionCommand, ManualCommand>;
 
 // The program with all its commands; the one that is chosen when `app` parses becomes `line`.
 void define_command_line(CLI::App& app, CommandLine& line);
