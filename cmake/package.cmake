@@ -15,12 +15,25 @@ file(WRITE ${package_files}/conffiles "/etc/rheonaut/rheonaut.toml\n")
 add_custom_command(
   OUTPUT ${package_files}/sbom.cdx.json
   COMMAND ${PYTHON3} ${PROJECT_SOURCE_DIR}/deploy/sbom $<TARGET_FILE:rheonaut> $<TARGET_FILE:rheonaut-sim>
-    > ${package_files}/sbom.cdx.json
-  DEPENDS rheonaut rheonaut-sim ${PROJECT_SOURCE_DIR}/deploy/sbom ${PROJECT_SOURCE_DIR}/web/package-lock.json)
-add_custom_target(package_files ALL DEPENDS ${package_files}/sbom.cdx.json)
+    $<TARGET_FILE:rheonaut-export> > ${package_files}/sbom.cdx.json
+  DEPENDS rheonaut rheonaut-sim rheonaut-export ${PROJECT_SOURCE_DIR}/deploy/sbom ${PROJECT_SOURCE_DIR}/web/package-lock.json)
+
+# Manual pages and completions, from the command line's own definition.
+set(pages ${package_files}/man1/rheonaut.1.gz)
+add_custom_command(
+  OUTPUT ${pages}
+  COMMAND ${PROJECT_SOURCE_DIR}/deploy/pages $<TARGET_FILE:rheonaut> $<TARGET_FILE:rheonaut-sim> ${package_files}
+  DEPENDS rheonaut rheonaut-sim ${PROJECT_SOURCE_DIR}/deploy/pages)
+add_custom_target(package_files ALL DEPENDS ${package_files}/sbom.cdx.json ${pages})
+install(DIRECTORY ${package_files}/man1 DESTINATION share/man)
+install(FILES ${package_files}/rheonaut.bash DESTINATION share/bash-completion/completions RENAME rheonaut)
+install(FILES ${package_files}/rheonaut-sim.bash DESTINATION share/bash-completion/completions RENAME rheonaut-sim)
+install(FILES ${package_files}/_rheonaut DESTINATION share/zsh/vendor-completions)
+install(FILES ${package_files}/rheonaut.fish DESTINATION share/fish/vendor_completions.d)
 
 set(debian ${PROJECT_SOURCE_DIR}/deploy/debian)
 install(TARGETS rheonaut rheonaut-sim RUNTIME DESTINATION bin)
+install(TARGETS rheonaut-export RUNTIME DESTINATION libexec/rheonaut)  # where the station looks for it
 install(FILES ${package_files}/rheonaut.toml DESTINATION /etc/rheonaut)
 install(FILES ${debian}/rheonaut.service ${debian}/rheonaut-backup.service ${debian}/rheonaut-backup.timer
   DESTINATION /lib/systemd/system)

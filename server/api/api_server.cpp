@@ -86,12 +86,12 @@ void ApiServer::add_routes(boost::asio::io_context& loop, station::Station& stat
   add_run_metrics_routes(router_, {documents_});
   add_comparison_routes(router_, {documents_});
   const analysis::ExportParts job_exports{recording.exports, recording.disk_watch, recording.job_files,
-                                          recording.path()};
+                                          recording.export_slots, recording.path()};
   add_job_routes(
       router_,
       {analysis, recording.designs, {documents_, job_exports}, recording.fluid_models, recording.jobs, recording.runs});
-  const ExportRoutes exports{tasks_, recording.exports, recording.disk_watch, recording.path(),
-                             recording.exports_folder()};
+  const ExportRoutes exports{tasks_,           recording.exports,         recording.disk_watch, recording.export_slots,
+                             recording.path(), recording.exports_folder()};
   add_capsule_routes(router_, {analysis, recording.designs, recording.digester, documents_, exports, recording.runs});
   add_design_routes(router_, {clock_, recording.designs, recording.jobs});
   add_push_routes(router_, {analysis, {clock_, history, station}, recording.designs});

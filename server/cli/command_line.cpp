@@ -136,7 +136,7 @@ void define_command_line(CLI::App& app, CommandLine& line) {
   offer<EstimatorQuestion>(app, "estimator", "Turn a plant into the model of the robot's estimator", line);
   offer<Tune>(app, "tune", "Find the controller for a crossover and a phase margin", line);
   offer<Discretise>(app, "discretise", "Turn the controller into coefficients for the robot", line);
-  offer<Export>(app, "export", "Write a recorded run as a file: CSV, MAT or SQLite", line);
+  offer<Export>(app, "export", "Write a recorded run as a file: CSV, MAT, SQLite or MCAP", line);
   offer<ReferenceCommand>(app, "reference", "A run's position as it was measured from outside: import, show, remove",
                           line);
   offer<Predict>(app, "predict", "Predict a closed-loop experiment, beside a recorded one", line);

@@ -13,6 +13,7 @@
 #include "server/station/station.hpp"
 #include "server/storage/database/database_reader.hpp"
 #include "server/storage/designs/designs.hpp"
+#include "server/storage/export/export_slots.hpp"
 #include "server/storage/groups/group_maker.hpp"
 #include "server/storage/ingest/recorder.hpp"
 #include "server/storage/jobs/job_files.hpp"
@@ -68,7 +69,8 @@ struct RecordingParts {
   ReservationBook reservations;
   Jobs jobs;
   History history;
-  History exports;  // the same on a worker of its own, so that no page waits behind an export
+  History exports;           // the same on a worker of its own, so that no page waits behind an export
+  ExportSlots export_slots;  // of files that are written in another program
   JobFiles job_files;
   DiskWatch disk_watch;
   Backups backups;

@@ -73,6 +73,12 @@ class PackageTest(unittest.TestCase):
         self.assertIn(f"rheonaut:x:{state.st_uid}:", self.path("/etc/passwd").read_text())
         checked = self.tree.run("rheonaut", "check-config", "--config", "/etc/rheonaut/rheonaut.toml").stdout
         self.assertIn("/var/lib/rheonaut", checked)
+        for page in ("rheonaut", "rheonaut-serve", "rheonaut-stop", "rheonaut-sim"):
+            self.assertTrue(self.path(f"/usr/share/man/man1/{page}.1.gz").exists(), page)
+        self.assertIn("_rheonaut", self.path("/usr/share/bash-completion/completions/rheonaut").read_text())
+        # HDF5, and what it pulls, is loaded by the program that writes export files alone.
+        self.assertNotIn("hdf5", self.tree.run("ldd", "/usr/bin/rheonaut").stdout)
+        self.assertIn("hdf5", self.tree.run("ldd", "/usr/libexec/rheonaut/rheonaut-export").stdout)
 
     def test_3_the_demo_brings_the_robot_to_its_setpoint(self):
         self.tree.run("useradd", "-m", "anna")

@@ -26,10 +26,11 @@ class Lab:
         self.data = self.folder / "data"
         self.processes = []
         self.station_process = None
+        self.bin = BIN  # the programs
 
     def _start(self, name, *arguments):
         log = open(self.folder / f"{name}.log", "ab")
-        process = subprocess.Popen([str(BIN / arguments[0]), *map(str, arguments[1:])], stdout=log,
+        process = subprocess.Popen([str(self.bin / arguments[0]), *map(str, arguments[1:])], stdout=log,
                                    stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL)
         log.close()
         self.processes.append(process)
@@ -57,7 +58,7 @@ class Lab:
 
     def tool(self, *arguments):
         """`rheonaut …`, run to its end."""
-        return subprocess.run([str(BIN / "rheonaut"), *map(str, arguments)], capture_output=True, text=True, timeout=60)
+        return subprocess.run([str(self.bin / "rheonaut"), *map(str, arguments)], capture_output=True, text=True, timeout=60)
 
     def start_robot(self, station, robot_id="sim-1", *flags):
         return self._start(robot_id, "rheonaut-sim", "--station", station.endpoints["robots"], "--id", robot_id, *flags)

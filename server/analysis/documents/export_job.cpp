@@ -1,16 +1,12 @@
-// Each format is a writer that advances by slices.
+// Follows the program that writes the file.
 #include "server/analysis/documents/export_job.hpp"
 
 #include <fmt/format.h>
 
-#include <fstream>
 #include <memory>
-#include <stdexcept>
+#include <utility>
 
-#include "server/storage/export/csv_writer.hpp"
-#include "server/storage/export/mat_writer.hpp"
-#include "server/storage/export/run_file.hpp"
-#include "server/storage/query/run_reader.hpp"
+#include "server/storage/export/export_child.hpp"
 #include "server/storage/upkeep/export_space.hpp"
 
 namespace server::analysis {
@@ -20,74 +16,45 @@ namespace {
 
 constexpr std::uint64_t kUsualPeriod_us = 10'000;
 
-// CSV as a file.
-class CsvFile {
- public:
-  CsvFile(const std::filesystem::path& path, std::vector<storage::RecordedSpan> spans,
-          const storage::ExportQuery& query)
-      : file_{path, std::ios::binary}, writer_{std::move(spans), query} {}
-
-  Result<bool> advance(SQLite::Database& database) {
-    const auto text = writer_.next(database);
-    if (text) file_ << *text;
-    if (!text) file_.close();
-    if (!file_) throw std::runtime_error{"the export cannot be written"};
-    return text.has_value();
-  }
-
- private:
-  std::ofstream file_;
-  storage::CsvWriter writer_;
-};
-
-// To its end, until there is no room, or until it is cancelled. The writer lives on the thread that it writes on.
-template <class Writer>
-asio::awaitable<Result<void>> write_all(ExportParts parts, std::shared_ptr<Writer> writer, std::filesystem::path path,
-                                        storage::JobRun& run) {
+// To its end, until there is no room, or until it is cancelled. The child lives on the thread that follows it.
+asio::awaitable<Result<void>> write_all(ExportParts parts, std::shared_ptr<storage::ExportChild> child,
+                                        std::filesystem::path path, storage::JobRun& run) {
   for (Result<bool> more = true; *more;) {
     if (run.is_cancelled()) co_return fail(ErrorCode::conflict, "cancelled");
-    auto slice = [writer, folder = parts.files.folder()](SQLite::Database& database) -> Result<bool> {
+    auto slice = [child, folder = parts.files.folder()](SQLite::Database&) -> Result<bool> {
       if (const auto room = storage::room_for_more(folder); !room) return std::unexpected{room.error()};
-      return writer->advance(database);
+      return child->advance();
     };
     more = co_await parts.exports.reader().ask(std::move(slice));
     if (!more) co_return std::unexpected{more.error()};
-    auto size = [path] { return storage::file_bytes(path); };
-    const std::uint64_t bytes = co_await parts.exports.reader().run(std::move(size));
+    auto look = [path, child] { return std::pair{storage::file_bytes(path), child->progress().share()}; };
+    const auto [bytes, share] = co_await parts.exports.reader().run(std::move(look));
     if (bytes > storage::kMaxJobFileBytes) {
       co_return fail(
           ErrorCode::invalid,
           fmt::format("the file would have more than {} bytes; ask for the export itself", storage::kMaxJobFileBytes),
           "too_large");
     }
-    run.report(0, fmt::format("writing: {:.1f} MB", 1e-6 * static_cast<double>(bytes)));
+    run.report(share, fmt::format("writing: {:.1f} MB", 1e-6 * static_cast<double>(bytes)));
   }
-  auto end = [writer = std::move(writer)]() mutable { writer.reset(); };
-  co_await parts.exports.reader().run(std::move(end));
   co_return Result<void>{};
 }
 
-template <class Writer, class... Arguments>
-asio::awaitable<Result<void>> write_with(ExportParts parts, storage::JobRun& run, std::filesystem::path path,
-                                         Arguments... arguments) {
-  auto make = [path, ... arguments = std::move(arguments)] { return std::make_shared<Writer>(path, arguments...); };
-  auto writer = co_await parts.exports.reader().run(std::move(make));
-  co_return co_await write_all(parts, std::move(writer), path, run);
+// Ended on the thread that has started it, whatever becomes of the job.
+asio::awaitable<Result<void>> write_by_child(ExportParts parts, storage::ExportOrder order, storage::JobRun& run) {
+  auto child = std::make_shared<storage::ExportChild>(order);
+  const auto written = co_await write_all(parts, child, order.file, run);
+  auto end = [last = std::move(child)]() mutable { last.reset(); };
+  co_await parts.exports.reader().run(std::move(end));
+  co_return written;
 }
 
 }  // namespace
 
-const char* text(ExportFormat value) {
-  switch (value) {
-    case ExportFormat::csv: return "csv";
-    case ExportFormat::mat: return "mat";
-    case ExportFormat::sqlite: return "sqlite";
-  }
-  return "";
-}
-
 asio::awaitable<Result<void>> write_export(ExportParts parts, ExportRequest request, storage::JobRun& run) {
   if (auto may = parts.disk_watch.may_begin("an export to a file"); !may) co_return may;
+  if (auto may = parts.slots.may_begin(); !may) co_return may;
+  const runtime::Counted slot{parts.slots.taken};
   run.report(0, fmt::format("reading run {}", request.query.run));
   auto spans = co_await parts.exports.spans(storage::excerpt_of(request.query.run));
   if (!spans) co_return std::unexpected{spans.error()};
@@ -99,15 +66,10 @@ asio::awaitable<Result<void>> write_export(ExportParts parts, ExportRequest requ
   };
   const auto room = co_await parts.exports.reader().ask(std::move(look));
   if (!room) co_return room;
-  co_await parts.exports.settle();  // events and commands that were received
-  const storage::ExportQuery query = request.query;
-  switch (request.format) {
-    case ExportFormat::csv: co_return co_await write_with<CsvFile>(parts, run, path, *spans, query);
-    case ExportFormat::mat: co_return co_await write_with<storage::MatWriter>(parts, run, path, *spans, query);
-    case ExportFormat::sqlite: break;
-  }
-  const std::string store = storage::reading_uri(parts.database, false);
-  co_return co_await write_with<storage::RunFile>(parts, run, path, store, *spans, query);
+  const auto stored = co_await parts.exports.store_waiting(std::move(*spans));
+  if (!stored) co_return stored;
+  storage::ExportOrder order{parts.database, request.format, request.query, path};
+  co_return co_await write_by_child(parts, std::move(order), run);
 }
 
 }  // namespace server::analysis

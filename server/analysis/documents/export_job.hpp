@@ -1,6 +1,6 @@
 // The job `export`: a run as a file that is kept for a while.
 //
-// Loop thread; the file is written on the exports' thread in slices of 20 ms, between which it may be cancelled.
+// Loop thread; the file is written by a program of its own (storage/export/export_child), which a cancelled job ends.
 #pragma once
 
 #include <boost/asio/awaitable.hpp>
@@ -9,7 +9,9 @@
 #include <string>
 
 #include "server/runtime/result.hpp"
+#include "server/storage/export/export_format.hpp"
 #include "server/storage/export/export_rows.hpp"
+#include "server/storage/export/export_slots.hpp"
 #include "server/storage/jobs/job_files.hpp"
 #include "server/storage/jobs/job_run.hpp"
 #include "server/storage/query/history.hpp"
@@ -17,19 +19,17 @@
 
 namespace server::analysis {
 
-enum class ExportFormat : std::uint8_t { csv, mat, sqlite };
-const char* text(ExportFormat value);
-
 struct ExportParts {
   storage::History& exports;  // on a worker of its own
   storage::DiskWatch& disk_watch;
   storage::JobFiles& files;
+  storage::ExportSlots& slots;
   std::filesystem::path database;
 };
 
 struct ExportRequest {
   storage::ExportQuery query;
-  ExportFormat format = ExportFormat::csv;
+  storage::ExportFormat format = storage::ExportFormat::csv;
 };
 
 // Writes the draft of the job. Errors: no such run, no room.

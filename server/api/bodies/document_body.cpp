@@ -178,14 +178,12 @@ Result<analysis::DocumentRequest> read_report(const Members& body) {
   return analysis::ReportRequest{std::move(*runs), std::move(*traces)};
 }
 
-Result<analysis::ExportFormat> read_format(const Members& body) {
-  using analysis::ExportFormat;
+Result<storage::ExportFormat> read_format(const Members& body) {
   const auto word = body.text("format", {0, kMaxWordBytes});
   if (!word) return std::unexpected{word.error()};
-  for (const ExportFormat format : {ExportFormat::csv, ExportFormat::mat, ExportFormat::sqlite}) {
-    if (*word == text(format)) return format;
-  }
-  return fail(ErrorCode::invalid, fmt::format("format is '{}', allowed are csv, mat, sqlite", *word), "out_of_range");
+  if (const auto format = storage::parse_export_format(*word)) return *format;
+  return fail(ErrorCode::invalid, fmt::format("format is '{}', allowed are csv, mat, sqlite, mcap", *word),
+              "out_of_range");
 }
 
 Result<analysis::DocumentRequest> read_export(const Members& body) {
@@ -199,9 +197,9 @@ Result<analysis::DocumentRequest> read_export(const Members& body) {
   const auto format = read_format(body);
   if (!format) return std::unexpected{format.error()};
   request.format = *format;
-  if (request.format == analysis::ExportFormat::sqlite && (body.has(kChannels) || body.has("grid_us"))) {
-    return fail(ErrorCode::invalid, "a SQLite file has every sample and channel: leave out channels and grid_us",
-                "out_of_range");
+  if (!storage::may_have_grid(request.format) && (body.has(kChannels) || body.has("grid_us"))) {
+    return fail(ErrorCode::invalid,
+                "a SQLite or MCAP file has every sample and channel: leave out channels and grid_us", "out_of_range");
   }
   if (body.has(kChannels)) {
     const auto names = body.text(kChannels, text_bytes("ExportJobBody.channels"));

@@ -27,7 +27,7 @@ std::string read_piece(const std::filesystem::path& path, std::uint64_t offset) 
 }
 
 // Makes the empty file, if there is room for what comes into it.
-Result<std::unique_ptr<ExportFile>> make_file(const std::filesystem::path& folder, const char* ending,
+Result<std::unique_ptr<ExportFile>> make_file(const std::filesystem::path& folder, const std::string& ending,
                                               std::uint64_t samples) {
   auto file = std::make_unique<ExportFile>(folder, ending);
   if (const auto room = storage::room_for_export(folder, samples); !room) return std::unexpected{room.error()};
@@ -56,7 +56,7 @@ ExportFile::~ExportFile() {
 }
 
 asio::awaitable<Result<ExportFilePtr>> begin_export_file(ExportRoutes parts, std::vector<storage::RecordedSpan> spans,
-                                                         std::uint64_t rows_per_sample, const char* ending) {
+                                                         std::uint64_t rows_per_sample, std::string ending) {
   if (auto may = parts.disk_watch.may_begin("an export to a file"); !may) {
     co_return std::unexpected{may.error()};
   }

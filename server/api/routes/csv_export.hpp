@@ -12,6 +12,7 @@
 #include "server/http/http.hpp"
 #include "server/runtime/tasks.hpp"
 #include "server/storage/export/csv_writer.hpp"
+#include "server/storage/export/export_child.hpp"
 #include "server/storage/query/history.hpp"
 #include "server/storage/upkeep/export_space.hpp"
 
@@ -66,7 +67,14 @@ using ExportFilePtr = std::unique_ptr<ExportFile, EndOnWorker>;
 // An empty file for what is made of these samples, with this number of rows each; low_space: there is no room for it.
 boost::asio::awaitable<Result<ExportFilePtr>> begin_export_file(ExportRoutes parts,
                                                                 std::vector<storage::RecordedSpan> spans,
-                                                                std::uint64_t rows_per_sample, const char* ending);
+                                                                std::uint64_t rows_per_sample, std::string ending);
+
+// A slice of a writer on this thread; of one that is another program, a wait for it.
+template <class Writer>
+Result<bool> advance(Writer& writer, SQLite::Database& database) {
+  return writer.advance(database);
+}
+inline Result<bool> advance(storage::ExportChild& child, SQLite::Database&) { return child.advance(); }
 
 // To its end, or until there is no room: nobody knows before how long the gaps of a grid are.
 template <class Writer>
@@ -74,7 +82,7 @@ boost::asio::awaitable<Result<void>> write_in_slices(ExportRoutes parts, Writer&
   for (Result<bool> more = true; *more;) {
     auto slice = [&writer, folder = parts.folder](SQLite::Database& database) -> Result<bool> {
       if (const auto room = storage::room_for_more(folder); !room) return std::unexpected{room.error()};
-      return writer.advance(database);
+      return advance(writer, database);
     };
     more = co_await parts.history.reader().ask(std::move(slice));
     if (!more) co_return std::unexpected{more.error()};

@@ -59,6 +59,7 @@ class Recorder;
 class ReservationBook;
 class RunDigester;
 class Runs;
+struct ExportSlots;
 struct OutsideReference;
 struct RecordingParts;
 struct StoreLoss;
@@ -108,6 +109,7 @@ struct ExportRoutes {
   runtime::TaskGroup& tasks;
   storage::History& history;  // on a worker of its own
   storage::DiskWatch& disk_watch;
+  storage::ExportSlots& slots;
   std::filesystem::path database;
   std::filesystem::path folder;  // of files on their way
 };

@@ -1,13 +1,11 @@
-// A run to take away: as CSV, as a MAT file, as a SQLite file.
+// A run to take away: as CSV, as a MAT file, as a SQLite file, as an MCAP file.
 #include <fmt/format.h>
 
 #include "server/api/bodies/query_params.hpp"
 #include "server/api/routes/csv_export.hpp"
 #include "server/api/routes/routes.hpp"
-#include "server/storage/export/mat_writer.hpp"
-#include "server/storage/export/run_file.hpp"
+#include "server/storage/export/export_slots.hpp"
 #include "server/storage/query/history.hpp"
-#include "server/storage/query/run_reader.hpp"
 
 namespace server::api {
 namespace asio = boost::asio;
@@ -63,35 +61,36 @@ std::uint64_t most_rows(const ParsedExport& parsed) {
   return 1 + kUsualPeriodUs / static_cast<std::uint64_t>(parsed.query.grid_us.value_or(kMaxGridUs));
 }
 
-EndOnWorker end_on_worker(ExportRoutes parts) { return {parts.tasks, parts.history.reader()}; }
-
-http::Answer export_mat(ExportRoutes parts, http::Request request) {
+http::Answer export_file(ExportRoutes parts, http::Request request, storage::ExportFormat format,
+                         const char* content_type) {
   auto parsed = co_await parse_export(parts, std::move(request));
   if (!parsed) co_return http::problem(parsed.error());
-  auto file = co_await begin_export_file(parts, parsed->spans, most_rows(*parsed), ".mat");
+  if (const auto may = parts.slots.may_begin(); !may) co_return http::problem(may.error());
+  const runtime::Counted slot{parts.slots.taken};
+  const std::string ending = fmt::format(".{}", text(format));
+  auto file = co_await begin_export_file(parts, parsed->spans, most_rows(*parsed), ending);
   if (!file) co_return http::problem(file.error());
-  const std::unique_ptr<storage::MatWriter, EndOnWorker> writer{
-      new storage::MatWriter{(*file)->path(), std::move(parsed->spans), parsed->query}, end_on_worker(parts)};
-  const Result<void> written = co_await write_in_slices(parts, *writer);
+  const auto stored = co_await parts.history.store_waiting(std::move(parsed->spans));
+  if (!stored) co_return http::problem(stored.error());
+  storage::ExportOrder order{parts.database, format, parsed->query, (*file)->path()};
+  const std::unique_ptr<storage::ExportChild, EndOnWorker> child{new storage::ExportChild{std::move(order)},
+                                                                 EndOnWorker{parts.tasks, parts.history.reader()}};
+  const Result<void> written = co_await write_in_slices(parts, *child);
   if (!written) co_return http::problem(written.error());
-  co_return attachment("application/x-matlab-data", parsed->query.run, ".mat",
+  co_return attachment(content_type, parsed->query.run, ending.c_str(),
                        std::make_unique<FileStream>(parts.history, std::move(*file)));
 }
 
+http::Answer export_mat(ExportRoutes parts, http::Request request) {
+  return export_file(parts, std::move(request), storage::ExportFormat::mat, "application/x-matlab-data");
+}
+
 http::Answer export_sqlite(ExportRoutes parts, http::Request request) {
-  auto parsed = co_await parse_export(parts, std::move(request));
-  if (!parsed) co_return http::problem(parsed.error());
-  auto file = co_await begin_export_file(parts, parsed->spans, most_rows(*parsed), ".sqlite");
-  if (!file) co_return http::problem(file.error());
-  co_await parts.history.settle();  // events and commands that were received
-  const std::unique_ptr<storage::RunFile, EndOnWorker> writer{
-      new storage::RunFile{(*file)->path(), storage::reading_uri(parts.database, false), std::move(parsed->spans),
-                           parsed->query},
-      end_on_worker(parts)};
-  const Result<void> written = co_await write_in_slices(parts, *writer);
-  if (!written) co_return http::problem(written.error());
-  co_return attachment("application/vnd.sqlite3", parsed->query.run, ".sqlite",
-                       std::make_unique<FileStream>(parts.history, std::move(*file)));
+  return export_file(parts, std::move(request), storage::ExportFormat::sqlite, "application/vnd.sqlite3");
+}
+
+http::Answer export_mcap(ExportRoutes parts, http::Request request) {
+  return export_file(parts, std::move(request), storage::ExportFormat::mcap, "application/octet-stream");
 }
 
 }  // namespace
@@ -104,6 +103,7 @@ void add_export_routes(http::Router& router, ExportRoutes parts) {
   add("/api/v1/runs/{run_id}/samples.csv", {"channels", "grid_us"}, export_csv);
   add("/api/v1/runs/{run_id}/samples.mat", {"channels", "grid_us"}, export_mat);
   add("/api/v1/runs/{run_id}/samples.sqlite", {}, export_sqlite);
+  add("/api/v1/runs/{run_id}/samples.mcap", {}, export_mcap);
 }
 
 }  // namespace server::api

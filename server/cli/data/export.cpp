@@ -2,18 +2,16 @@
 #include "server/cli/data/export.hpp"
 
 #include <fmt/format.h>
+#include <unistd.h>
 
-#include <fstream>
+#include <cstdio>
 #include <ostream>
 #include <stdexcept>
 
 #include "server/cli/terminal/exit_status.hpp"
 #include "server/cli/terminal/options.hpp"
 #include "server/storage/database/finished_file.hpp"
-#include "server/storage/export/csv_writer.hpp"
-#include "server/storage/export/mat_writer.hpp"
-#include "server/storage/export/run_file.hpp"
-#include "server/storage/query/run_reader.hpp"
+#include "server/storage/export/export_child.hpp"
 
 namespace server::cli {
 namespace {
@@ -45,65 +43,24 @@ class PartFile {
   std::filesystem::path path_;
 };
 
-Result<void> write_csv(SQLite::Database& database, storage::CsvWriter writer, const std::filesystem::path& path) {
-  std::ofstream file{path, std::ios::binary | std::ios::trunc};
-  while (const auto piece = writer.next(database)) file << *piece;
-  file.flush();
-  if (!file) throw std::runtime_error{fmt::format("cannot write {}; is the disk full?", path.string())};
-  return {};
-}
-
-Result<void> write_mat(SQLite::Database& database, const std::filesystem::path& path,
-                       std::vector<storage::RecordedSpan> spans, const storage::ExportQuery& query) {
-  storage::MatWriter writer{path, std::move(spans), query};
-  for (;;) {
-    const auto more = writer.advance(database);
-    if (!more) return std::unexpected{more.error()};
-    if (!*more) return {};
+// Shows how far it is, where somebody watches.
+void write(const storage::ExportOrder& order) {
+  const bool is_watched = ::isatty(STDERR_FILENO) == 1;
+  storage::ExportChild child{order};
+  for (Result<bool> more = true; *more;) {
+    more = child.advance();
+    if (is_watched) fmt::print(stderr, "\r{:3.0f} %", 100 * child.progress().share());
+    if (is_watched && (!more || !*more)) fmt::print(stderr, "\r     \r");
+    if (!more) throw std::runtime_error{more.error().detail};
   }
-}
-
-Result<void> write_sqlite(SQLite::Database& database, const std::string& uri, const std::filesystem::path& path,
-                          std::vector<storage::RecordedSpan> spans, const storage::ExportQuery& query) {
-  std::filesystem::remove(path);  // of an attempt that was begun again
-  storage::RunFile writer{path, uri, std::move(spans), query};
-  while (writer.advance(database)) continue;
-  return {};
-}
-
-Result<void> write(SQLite::Database& database, const std::string& uri, const Export& options,
-                   const storage::ExportQuery& query, const std::filesystem::path& path) {
-  if (database.execAndGet("PRAGMA user_version").getInt64() < 2) {
-    return fail(ErrorCode::invalid, "the database is of an earlier version; let a station open it once");
-  }
-  if (!storage::run_exists(database, query.run)) {
-    return fail(ErrorCode::not_found, fmt::format("there is no run {} in {}", query.run, options.data_dir.string()));
-  }
-  std::vector<storage::RecordedSpan> spans = storage::read_spans(database, query.run, 0);
-  for (storage::RecordedSpan& span : spans) span.cut(span.made());
-  switch (options.format) {
-    case ExportFormat::csv: return write_csv(database, storage::CsvWriter{std::move(spans), query}, path);
-    case ExportFormat::mat: return write_mat(database, path, std::move(spans), query);
-    case ExportFormat::sqlite: return write_sqlite(database, uri, path, std::move(spans), query);
-  }
-  return {};
 }
 
 }  // namespace
 
-const char* text(ExportFormat value) {
-  switch (value) {
-    case ExportFormat::csv: return "csv";
-    case ExportFormat::mat: return "mat";
-    case ExportFormat::sqlite: return "sqlite";
-  }
-  return "";
-}
-
 void add_options(CLI::App& command, Export& options) {
   command.add_option("--run", options.run, "A recorded run by its number")->required()->check(whole(1, kLargestRun));
-  add_word(command, "--format", options.format, std::array{ExportFormat::csv, ExportFormat::mat, ExportFormat::sqlite},
-           "csv, mat (MATLAB and Octave) or sqlite")
+  add_word(command, "--format", options.format, storage::kExportFormats,
+           "csv, mat (MATLAB and Octave), sqlite or mcap (Foxglove)")
       ->required();
   command.add_option("--to", options.to, "The file; one that is there is replaced")->required()->check(named());
   command.add_option("--grid-us", options.grid_us, "csv, mat: rows at equal steps of time, the nearest sample or none")
@@ -118,18 +75,14 @@ void add_options(CLI::App& command, Export& options) {
 
 int run(const Export& options, std::ostream& out) {
   storage::ExportQuery query{.run = options.run, .channels = storage::all_channels(), .grid_us = options.grid_us};
-  if (options.grid_us && options.format == ExportFormat::sqlite) throw UsageError{"--grid-us is for csv and mat"};
+  if (options.grid_us && !storage::may_have_grid(options.format)) throw UsageError{"--grid-us is for csv and mat"};
   if (!options.channels.empty()) {
     const auto channels = storage::parse_channels(options.channels);
     if (!channels) throw UsageError{"--" + channels.error().detail};
     query.channels = *channels;
   }
   PartFile part{options.to};
-  const auto read = [&](SQLite::Database& database, const std::string& uri) {
-    return write(database, uri, options, query, part.path());
-  };
-  const auto done = storage::read_store(options.data_dir / "station.sqlite", read);
-  if (!done) throw std::runtime_error{done.error().detail};
+  write({options.data_dir / "station.sqlite", options.format, query, part.path()});
   part.keep();
   out << fmt::format("run {}: {} ({} bytes)\n", options.run, options.to.string(),
                      std::filesystem::file_size(options.to));

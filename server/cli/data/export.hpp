@@ -1,4 +1,4 @@
-// `rheonaut export`: a recorded run as a file of CSV, MAT or SQLite, read from a station's folder.
+// `rheonaut export`: a recorded run as a file of CSV, MAT, SQLite or MCAP, read from a station's folder.
 #pragma once
 
 #include <cstdint>
@@ -7,14 +7,15 @@
 #include <optional>
 #include <string>
 
+#include "server/storage/export/export_format.hpp"
+
 namespace CLI {
 class App;
 }
 
 namespace server::cli {
 
-enum class ExportFormat : std::uint8_t { csv, mat, sqlite };
-const char* text(ExportFormat value);
+using storage::ExportFormat;
 
 struct Export {
   std::int64_t run = 0;

@@ -37,6 +37,9 @@ class CsvWriter {
   // The next lines, some 400 kB at most; none at the end. Takes at most 20 ms. The text may be empty.
   std::optional<std::string> next(SQLite::Database& database);
 
+  // The last sample that was read; none: at the beginning and at the end.
+  const std::optional<SampleCursor>& position() const { return after_; }
+
  private:
   std::string header() const;
   void append_rows(std::string& out);

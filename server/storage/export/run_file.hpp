@@ -20,6 +20,7 @@
 
 #include "server/storage/database/schema.hpp"
 #include "server/storage/export/export_rows.hpp"
+#include "server/storage/export/run_tables.hpp"
 
 namespace server::storage {
 
@@ -34,12 +35,11 @@ class RunFile {
   // Works on for at most 20 ms; false when the file is whole. It is not synced.
   bool advance(SQLite::Database& database);
 
+  // The last sample that was read; none: at the beginning and at the end.
+  const std::optional<SampleCursor>& position() const { return after_; }
+
  private:
   void begin();
-  void copy_some();
-  bool reference_is_whole();
-  void copy_reference_again();
-  void add_gaps(SQLite::Database& database);
   bool add_samples(SQLite::Database& database);
   void add(const ExportSegment& segment);
   void bind_shared(const station::SampleContext& context);
@@ -49,11 +49,8 @@ class RunFile {
   std::vector<RecordedSpan> spans_;
   ExportQuery query_;
   std::unique_ptr<SQLite::Database> file_;
+  std::optional<RunTables> tables_;
   std::unique_ptr<SQLite::Statement> insert_;
-  std::size_t copied_ = 0;  // tables
-  int reference_tries_ = 0;
-  std::int64_t piece_after_ = 0;  // of the table that is copied: where the next piece begins
-  std::optional<SampleCursor> gaps_after_;
   std::optional<SampleCursor> after_;
   bool at_end_ = false;
   SegmentRows segments_;

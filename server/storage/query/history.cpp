@@ -46,6 +46,18 @@ History::History(std::filesystem::path database, Recorder& recorder, runtime::Wo
 
 asio::awaitable<void> History::settle() { co_await recorder_.flush_records(); }
 
+asio::awaitable<Result<void>> History::store_waiting(std::vector<RecordedSpan> spans) {
+  bool is_stored = co_await recorder_.flush_records();
+  for (const RecordedSpan& span : spans) {
+    if (span.waiting.empty() && span.waiting_gaps.empty()) continue;
+    const bool has_samples = co_await recorder_.flush(span.boot_id);
+    is_stored = is_stored && has_samples;
+  }
+  if (is_stored) co_return Result<void>{};
+  co_return fail(ErrorCode::unavailable,
+                 "the station's disk has not taken what was recorded last; ask again when it takes it", "not_durable");
+}
+
 asio::awaitable<Result<std::vector<RecordedSpan>>> History::spans(Excerpt excerpt, std::optional<SampleCursor> after,
                                                                   std::size_t limit) {
   if (excerpt.window) limit = Recorder::kAll;

@@ -88,6 +88,9 @@ class History {
 
   // Returns when every command and event that the recorder has received is durable, or after 3 s when the disk fails.
   boost::asio::awaitable<void> settle();
+  // Returns when all of that and the samples that wait of these spans are durable: for a reader of the database that is
+  // another program. unavailable: the disk has not taken them within 3 s.
+  boost::asio::awaitable<Result<void>> store_waiting(std::vector<RecordedSpan> spans);
 
   // For questions of one's own, and for text that is made of what a question gave.
   DatabaseReader& reader() { return reader_; }

@@ -8,7 +8,7 @@
 namespace server::storage {
 namespace {
 
-constexpr std::uint64_t kSampleBytes = 200;                  // at most, in any format's file
+constexpr std::uint64_t kSampleBytes = 700;                  // at most, in any format's file
 constexpr std::uint64_t kSpareBytes = 512ULL * 1024 * 1024;  // that the recording goes on with
 
 }  // namespace

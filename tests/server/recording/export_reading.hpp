@@ -13,7 +13,7 @@
 #include "server/station/state/unknown_values.hpp"
 #include "server/storage/database/database.hpp"
 #include "server/storage/export/csv_writer.hpp"
-#include "server/storage/export/mat_writer.hpp"
+#include "server/storage/export/mat/mat_writer.hpp"
 #include "server/storage/export/run_file.hpp"
 #include "server/storage/query/run_reader.hpp"
 #include "tests/server/recording/random_recording.hpp"

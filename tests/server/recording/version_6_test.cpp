@@ -62,7 +62,7 @@ class Version6Test : public RecordingTest {
     cli::Export options;
     options.run = 1;
     options.format = format;
-    options.to = folder_ / (std::string{"run_1."} + cli::text(format));
+    options.to = folder_ / (std::string{"run_1."} + storage::text(format));
     options.data_dir = folder_;
     std::ostringstream out;
     EXPECT_EQ(cli::run(options, out), 0);

@@ -15,7 +15,7 @@
 #include "server/live/state_json.hpp"
 #include "server/storage/commits/sample_store.hpp"
 #include "server/storage/export/csv_writer.hpp"
-#include "server/storage/export/mat_writer.hpp"
+#include "server/storage/export/mat/mat_writer.hpp"
 #include "server/storage/export/run_file.hpp"
 #include "server/storage/query/run_reader.hpp"
 #include "server/storage/runs/run_digest.hpp"

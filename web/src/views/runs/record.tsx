@@ -251,6 +251,7 @@ const kFiles: readonly { name: string; text: string; what: string; exports: bool
   { name: 'samples.csv', text: 'CSV', what: 'a line per sample', exports: true },
   { name: 'samples.mat', text: 'MAT', what: 'for MATLAB and Octave', exports: true },
   { name: 'samples.sqlite', text: 'SQLite', what: 'with events, commands, markers', exports: true },
+  { name: 'samples.mcap', text: 'MCAP', what: 'for Foxglove', exports: true },
   { name: 'capsule.eln', text: 'Archive .eln', what: 'all of it, to check and compute again', exports: true },
 ];
 

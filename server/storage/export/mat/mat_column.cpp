@@ -1,5 +1,5 @@
 // The bytes of a miMATRIX element.
-#include "server/storage/export/mat_column.hpp"
+#include "server/storage/export/mat/mat_column.hpp"
 
 #include <fcntl.h>
 #include <stdlib.h>

@@ -1,5 +1,5 @@
 // matio writes `info`; the columns are appended to its file.
-#include "server/storage/export/mat_writer.hpp"
+#include "server/storage/export/mat/mat_writer.hpp"
 
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -12,8 +12,7 @@
 #include <memory>
 #include <system_error>
 
-#include "server/station/state/unknown_values.hpp"
-#include "server/storage/database/statement.hpp"
+#include "server/storage/export/run_facts.hpp"
 
 namespace server::storage {
 namespace {
@@ -22,29 +21,6 @@ constexpr std::size_t kMatPageSamples = 10'000;
 constexpr std::size_t kMaxGridRows = 50'000;  // at a time; a gap may be long
 constexpr std::uint64_t kMaxColumnBytes = (std::uint64_t{1} << 31) - 1024;
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
-
-using Facts = std::vector<std::pair<std::string, std::string>>;
-
-// Everything that the table says of the run, whatever columns its version has.
-void add_facts(SQLite::Database& database, const char* table, const char* prefix, RunId run, Facts& facts) {
-  SQLite::Statement query{database, fmt::format("SELECT * FROM {} WHERE run_id = ?", table)};
-  bind_all(query, run);
-  if (!query.executeStep()) return;
-  for (int column = 0; column < query.getColumnCount(); ++column) {
-    facts.emplace_back(fmt::format("{}{}", prefix, query.getColumnName(column)), query.getColumn(column).getString());
-  }
-}
-
-// "0 none, 1 navigating": those without a gap from 0 on.
-template <class Enumerator>
-std::string names() {
-  std::string out;
-  for (int number = 0; number == 0 || !station::is_unknown(static_cast<Enumerator>(number)); ++number) {
-    const char* comma = number == 0 ? "" : ", ";
-    out += fmt::format("{}{} {}", comma, number, protocol::text(static_cast<Enumerator>(number)));
-  }
-  return out;
-}
 
 // Numbers first, then the rest.
 template <class Put>
@@ -125,18 +101,13 @@ Result<bool> MatWriter::advance(SQLite::Database& database) {
 }
 
 void MatWriter::write_facts(SQLite::Database& database) {
-  Facts facts;
-  add_facts(database, "run", "", query_.run, facts);
-  add_facts(database, "run_certificate", "certificate_", query_.run, facts);
+  Facts facts = facts_of_run(database, query_.run);
   std::string boot_ids;
   for (const RecordedSpan& span : spans_) {
     boot_ids += fmt::format("{}{} {}", boot_ids.empty() ? "" : ", ", span.span, span.boot_id);
   }
   facts.emplace_back("boot_ids", boot_ids);
-  station::for_each_batch_field_of<station::FieldKind::enumerator>(
-      [&]<class Enumerator>(const station::BatchField<Enumerator>& field) {
-        facts.emplace_back(fmt::format("{}s", field.name), names<Enumerator>());
-      });
+  for (auto& names : enumerator_names()) facts.push_back(std::move(names));
   facts.emplace_back("grid_us", query_.grid_us ? std::to_string(*query_.grid_us) : "");
   write_struct(path_, facts);
 }

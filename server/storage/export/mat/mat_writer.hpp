@@ -21,7 +21,7 @@
 
 #include "server/runtime/result.hpp"
 #include "server/storage/export/export_rows.hpp"
-#include "server/storage/export/mat_column.hpp"
+#include "server/storage/export/mat/mat_column.hpp"
 
 namespace server::storage {
 
@@ -35,6 +35,9 @@ class MatWriter {
 
   // Works on for at most 20 ms; false when the file is whole. It is not synced.
   Result<bool> advance(SQLite::Database& database);
+
+  // The last sample that was read; none: at the beginning and at the end.
+  const std::optional<SampleCursor>& position() const { return after_; }
 
  private:
   void add_columns();

@@ -1,0 +1,44 @@
+// Writes one run into one file for the program that started it, and ends with that program.
+#include <sys/prctl.h>
+#include <sys/resource.h>
+#include <sys/syscall.h>
+#include <unistd.h>
+
+#include <csignal>
+#include <exception>
+
+#include "server/exporter/export_work.hpp"
+
+using namespace server;  // NOLINT: this file is the program, seen from outside
+
+static void tell(const storage::ExportLine& line) {
+  const std::string text = storage::line_text(line);
+  if (::write(STDOUT_FILENO, text.data(), text.size()) < 0) ::_exit(EXIT_FAILURE);  // nobody waits for the file
+}
+
+// The recording goes first: its threads and its disk.
+static void be_modest() {
+  constexpr int kNiceness = 10, kOfThisProcess = 1, kIdleClass = 3, kClassShift = 13;
+  ::setpriority(PRIO_PROCESS, 0, kNiceness);
+  ::syscall(SYS_ioprio_set, kOfThisProcess, 0, kIdleClass << kClassShift);
+}
+
+int main(int argc, char** argv) try {
+  std::signal(SIGPIPE, SIG_IGN);
+  std::signal(SIGXFSZ, SIG_IGN);  // a file that may not grow is an error of write()
+  const auto received = storage::parse_export_arguments({argv + 1, argv + argc});
+  if (!received) {
+    tell(received.error());
+    return EXIT_FAILURE;
+  }
+  // SAFETY: it ends with the program that started it, also when that has ended before this line.
+  ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+  if (::getppid() != received->parent) return EXIT_FAILURE;
+  be_modest();
+  const auto written = exporter::write_export(received->order, tell);
+  written ? tell(storage::ExportDone{}) : tell(written.error());
+  return written ? EXIT_SUCCESS : EXIT_FAILURE;
+} catch (const std::exception& error) {
+  tell(Error{ErrorCode::unavailable, error.what(), "export_failed"});
+  return EXIT_FAILURE;
+}
