@@ -17,7 +17,6 @@ import sys
 PROGRAMS = ("rheonaut", "rheonaut-sim")
 SEPARATOR = re.compile(r"[|&;<>()]+")
 NEVER_COMMANDS = re.compile(r"^(CHANGELOG\.md|docs/decisions/)")  # they speak of commands as they were
-MADE_ELSEWHERE = {"demo", "deploy/package"}  # of the package of a release
 
 
 @functools.cache
@@ -43,7 +42,7 @@ def fault_of_program(words):
         elif word in subcommands:
             path += (word,)
             options |= help_of(path)[1]
-        elif path == ("rheonaut",) and re.fullmatch(r"[a-z][a-z-]*", word) and word not in MADE_ELSEWHERE:
+        elif path == ("rheonaut",) and re.fullmatch(r"[a-z][a-z-]*", word):
             return f"rheonaut has no command {word}"
     return None
 
@@ -58,8 +57,6 @@ def text_of_script(path):
 
 def fault_of_script(root, words):
     path = root / words[0]
-    if words[0] in MADE_ELSEWHERE:
-        return None
     if not path.is_file():
         return f"there is no {words[0]}"
     if not os.access(path, os.X_OK):

@@ -46,6 +46,7 @@ const sidebar = [
       page('Reliability', 'reliability'),
       page('Security', 'security'),
       page('Performance', 'performance'),
+      page('Compatibility', 'compatibility'),
       page('The paper, number by number', 'paper'),
       page('References', 'references'),
     ],
