@@ -17,6 +17,7 @@ CLI::App* offer(CLI::App& command, RobotCommand& options, RobotCommand::Act act,
                 const char* purpose) {
   CLI::App* sub = command.add_subcommand(name, purpose);
   sub->add_option("--data", options.data_dir, "Folder of the station (default: rheonaut-data)")->check(named());
+  sub->add_flag("--json", options.json, "As JSON");
   sub->callback([&options, act] { options.act = act; });
   return sub;
 }
@@ -71,10 +72,8 @@ void add_options(CLI::App& command, RobotCommand& options) {
   auto* enroll = offer(command, options, RobotCommand::Act::enroll, "enroll",
                        "Give a robot a token and print it: it is shown only now");
   enroll->add_option("robot_id", options.robot_id, "1 to 31 characters of [a-z0-9_-]")->required()->check(robot_id());
-  enroll->add_flag("--json", options.json, "As JSON");
   enroll->footer("Example: rheonaut robot enroll rheo-1 --data lab");
-  offer(command, options, RobotCommand::Act::list, "list", "List the robots that may or might connect")
-      ->add_flag("--json", options.json, "As JSON");
+  offer(command, options, RobotCommand::Act::list, "list", "List the robots that may or might connect");
   constexpr std::tuple<RobotCommand::Act, const char*, const char*> kOfOne[] = {
       {RobotCommand::Act::revoke, "revoke", "Refuse a robot from now on, and end its connection"},
       {RobotCommand::Act::retire, "retire", "Leave a robot out of the stop of all robots while it is not connected"},
@@ -104,7 +103,11 @@ int run(const RobotCommand& options, std::ostream& out) {
   const char* done = options.act == RobotCommand::Act::revoke   ? "revoked"
                      : options.act == RobotCommand::Act::retire ? "retired"
                                                                 : "put back into use";
-  fmt::print(out, "Robot {} was {}\n", options.robot_id, done);
+  if (options.json) {
+    fmt::print(out, "{}\n", nlohmann::json{{"robot_id", options.robot_id}, {"result", done}}.dump(2));
+  } else {
+    fmt::print(out, "Robot {} was {}\n", options.robot_id, done);
+  }
   return 0;
 }
 

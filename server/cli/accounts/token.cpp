@@ -16,6 +16,7 @@ CLI::App* offer(CLI::App& command, TokenCommand& options, TokenCommand::Act act,
                 const char* purpose) {
   CLI::App* sub = command.add_subcommand(name, purpose);
   sub->add_option("--data", options.data_dir, "Folder of the station (default: rheonaut-data)")->check(named());
+  sub->add_flag("--json", options.json, "As JSON");
   sub->callback([&options, act] { options.act = act; });
   return sub;
 }
@@ -62,10 +63,8 @@ void add_options(CLI::App& command, TokenCommand& options) {
   create->add_option("--scopes", options.scopes, "Of read, stop, record, command, admin (default: read,stop)")
       ->check(named());
   create->add_option("--days", options.days, "After so many it runs out (default: it does not)")->check(whole(1, 3650));
-  create->add_flag("--json", options.json, "As JSON");
   create->footer("Example: rheonaut token create logger --scopes read,record --days 30 --data lab");
-  offer(command, options, TokenCommand::Act::list, "list", "List the tokens")
-      ->add_flag("--json", options.json, "As JSON");
+  offer(command, options, TokenCommand::Act::list, "list", "List the tokens");
   offer(command, options, TokenCommand::Act::revoke, "revoke", "End a token at once")
       ->add_option("name", options.name, "What it is called")
       ->required()
@@ -78,7 +77,11 @@ int run(const TokenCommand& options, std::ostream& out) {
   AccountAccess accounts{options.data_dir, AccountAccess::Missing::refuse};
   if (options.act == TokenCommand::Act::list) return list_tokens(accounts.tokens(), options.json, out);
   accounts.revoke_token(options.name);
-  fmt::print(out, "Token {} was revoked\n", options.name);
+  if (options.json) {
+    fmt::print(out, "{}\n", nlohmann::json{{"name", options.name}, {"result", "was revoked"}}.dump(2));
+  } else {
+    fmt::print(out, "Token {} was revoked\n", options.name);
+  }
   return 0;
 }
 

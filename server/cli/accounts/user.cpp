@@ -15,6 +15,7 @@ namespace {
 CLI::App* offer(CLI::App& command, UserCommand& options, UserCommand::Act act, const char* name, const char* purpose) {
   CLI::App* sub = command.add_subcommand(name, purpose);
   sub->add_option("--data", options.data_dir, "Folder of the station (default: rheonaut-data)")->check(named());
+  sub->add_flag("--json", options.json, "As JSON");
   sub->callback([&options, act] { options.act = act; });
   return sub;
 }
@@ -47,8 +48,7 @@ void add_options(CLI::App& command, UserCommand& options) {
   add_word(*add, "--role", options.role, identity::kRoles, "viewer (sees, stops), operator (commands) or admin")
       ->required();
   add->footer("Example: rheonaut user add anna --role operator --data lab");
-  offer(command, options, UserCommand::Act::list, "list", "List the users")
-      ->add_flag("--json", options.json, "As JSON");
+  offer(command, options, UserCommand::Act::list, "list", "List the users");
   add_name(offer(command, options, UserCommand::Act::remove, "remove", "Remove a user, with sessions and tokens"),
            options);
   add_name(offer(command, options, UserCommand::Act::password, "password",
@@ -81,7 +81,11 @@ int run(const UserCommand& options, std::ostream& out) {
     case UserCommand::Act::disable: accounts.set_disabled(options.name, true), done = "is kept out"; break;
     case UserCommand::Act::enable: accounts.set_disabled(options.name, false), done = "may sign in"; break;
   }
-  fmt::print(out, "User {} {}\n", options.name, done);
+  if (options.json) {
+    fmt::print(out, "{}\n", nlohmann::json{{"name", options.name}, {"result", done}}.dump(2));
+  } else {
+    fmt::print(out, "User {} {}\n", options.name, done);
+  }
   return 0;
 }
 

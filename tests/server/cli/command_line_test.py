@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 """Goes over every command of `rheonaut`: --help, completion, manual pages, exit status of mistakes, suggestions."""
+import json
 import os
 import pathlib
 import re
@@ -10,6 +11,10 @@ import unittest
 
 ROOT = pathlib.Path(__file__).parents[3]
 BIN = pathlib.Path(os.environ["RHEONAUT_BIN"])
+# What prints no result for people: a program that runs on, scripts and pages, documents that are JSON or CSV already.
+WITHOUT_JSON = {"serve", "completion", "man", "design show", "design export", "reference export"}
+JSON_IS_MISSING = {"check-config", "certificate", "backup", "restore", "report", "capsule", "export", "reference import",
+                   "reference show", "reference remove"}  # known, and no others
 ROFF_REQUESTS = {"TH", "SH", "SS", "TP", "PP", "EX", "EE"}
 
 
@@ -78,6 +83,18 @@ class CommandLineTest(unittest.TestCase):
                 for line in command.help.splitlines():
                     known = line.startswith(("Example: ", "Usage: ")) or '{"kp"' in line
                     self.assertTrue(known or len(line) <= 80, line)
+
+    def test_every_command_answers_in_json(self):
+        without = {" ".join(command.words) for command in COMMANDS
+                   if not command.commands and "--json" not in command.options}
+        self.assertEqual(without, WITHOUT_JSON | JSON_IS_MISSING)
+        with tempfile.TemporaryDirectory() as folder:
+            for words in (["token", "create", "a"], ["token", "revoke", "a"], ["robot", "enroll", "r"],
+                          ["robot", "retire", "r"], ["robot", "list"], ["user", "list"], ["bode"], ["profile"]):
+                data = [] if words[0] in ("bode", "profile") else ["--data", folder]
+                done = run(*words, "--json", *data)
+                self.assertEqual((done.returncode, done.stderr), (0, ""), words)
+                json.loads(done.stdout)
 
     def test_a_mistake_is_exit_status_2_with_a_suggestion(self):
         for command in COMMANDS:
