@@ -21,7 +21,7 @@
 
 using namespace server;  // NOLINT: this file is the station, seen from outside
 static int serve(const config::Config& config) {
-  runtime::start_log(config.log_level);
+  runtime::start_log(config.log_level, config.log_format);
   config::DataFolder folder{config.data_dir};
   // The ground everything stands on; declared first, destroyed last.
   boost::asio::io_context loop{1};  // all sockets, all live state
