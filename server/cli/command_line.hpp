@@ -33,6 +33,8 @@
 #include "server/cli/design/tune.hpp"
 #include "server/cli/experiments/autotune.hpp"
 #include "server/cli/experiments/experiment.hpp"
+#include "server/cli/health/doctor.hpp"
+#include "server/cli/health/support_bundle.hpp"
 #include "server/config/config.hpp"
 
 namespace server::cli {
@@ -54,7 +56,7 @@ using CommandLine = std::variant<Answered, Serve, CheckConfig, Certificate, Back
                                  Bode, Step, Identify, EstimatorQuestion, Tune, Discretise, Predict, UserCommand,
                                  TokenCommand, RobotCommand, FluidCommand, JobCommand, DesignCommand, MetricsQuestion,
                                  CompareQuestion, ImpedanceMapQuestion, ReportQuestion, CapsuleQuestion, Reproduce,
-                                 ReferenceCommand, ProfileQuestion, ExperimentCommand, Autotune>;
+                                 ReferenceCommand, ProfileQuestion, ExperimentCommand, Autotune, Doctor, SupportBundle>;
 
 CommandLine parse_command_line(int argc, char** argv);
 
