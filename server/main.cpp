@@ -9,19 +9,19 @@
 #include "server/config/data_folder.hpp"
 #include "server/config/endpoint.hpp"
 #include "server/config/station_document.hpp"
+#include "server/config/supervision.hpp"
 #include "server/experiments/runner/experiments.hpp"
 #include "server/link/robot_listener.hpp"
 #include "server/live/live_feed.hpp"
 #include "server/net/transport_security.hpp"
 #include "server/runtime/log.hpp"
 #include "server/runtime/real_time.hpp"
-#include "server/runtime/supervision.hpp"
 #include "server/station/models/model_sender.hpp"
 #include "server/storage/recording_parts.hpp"
 
 using namespace server;  // NOLINT: this file is the station, seen from outside
 static int serve(const config::Config& config) {
-  runtime::start_log(config.log_level);
+  runtime::start_log(config.log_level, config.log_format);
   config::DataFolder folder{config.data_dir};
   // The ground everything stands on; declared first, destroyed last.
   boost::asio::io_context loop{1};  // all sockets, all live state
@@ -61,7 +61,7 @@ static int serve(const config::Config& config) {
   tasks.spawn("signals", tasks.stop_on_signal());
   tasks.spawn("security", security.run());
   tasks.spawn("announcement", folder.announce(clock, {api.address(), options.robots_address, security.to_trust()}));
-  tasks.spawn("supervision", runtime::tell_supervisor(clock, "page " + api.url()));
+  tasks.spawn("supervision", config::tell_supervisor(clock, "page " + api.url()));
   api.say_ready(options.robots_address, config.data_dir);
   tasks.run(clock);   // returns when every task has ended
   recording.close();  // every sample that was received is on disk

@@ -75,7 +75,9 @@ void ApiServer::add_routes(boost::asio::io_context& loop, station::Station& stat
                            experiments::Experiments& experiments) {
   storage::History& history = recording.history;
   add_station_routes(router_, {auth_, clock_, recording.head_watch, recording.recorder, facts_});
-  add_recording_routes(router_, {clock_, recording, station, *facts_.security, tasks_.exceptions()});
+  const RecordingRoutes of_recording{clock_, recording, station, *facts_.security, tasks_.exceptions(), lateness_};
+  add_recording_routes(router_, of_recording);
+  add_health_routes(router_, of_recording);
   add_robot_routes(router_, {loop, history, station, texts_});
   station.set_account_of([this](const std::string& actor) { return accounts_.account_of(actor); });
   add_reservation_routes(router_, {accounts_, clock_, recording.reservations, station});
@@ -111,6 +113,7 @@ void ApiServer::add_routes(boost::asio::io_context& loop, station::Station& stat
 
 boost::asio::awaitable<void> ApiServer::run() {
   tasks_.spawn("accounts", accounts_.run());
+  tasks_.spawn("lateness", lateness_.run(clock_));
   co_await server_.run();
 }
 

@@ -17,6 +17,7 @@
 #include "server/identity/logins.hpp"
 #include "server/live/robot_texts.hpp"
 #include "server/net/transport_security.hpp"
+#include "server/runtime/loop_lateness.hpp"
 
 namespace server::api {
 
@@ -68,6 +69,7 @@ class ApiServer {
   identity::Logins logins_;
   http::RequestGuard guard_;
   live::RobotTexts texts_;
+  runtime::LoopLateness lateness_;
   analysis::RunDocuments documents_;
   StationFacts facts_;
   LiveParts live_;

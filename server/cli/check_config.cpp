@@ -51,6 +51,8 @@ int run(const CheckConfig& line, std::ostream& out) {
   }
   print_limits("fluid    not known: ", config.envelope.strictest());
   print_recording(config.recording, out);
+  fmt::print(out, "log      from level {} on, as {}\n", config.log_level,
+             config.log_format == "json" ? "JSON, one object a line" : "text");
   fmt::print(out, "the configuration is valid\n");
   return 0;
 }

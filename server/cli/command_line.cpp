@@ -53,7 +53,8 @@ void offer(CLI::App& app, const char* name, const char* purpose, CommandLine& li
 
 // The headings of --help, in its order, and their commands.
 const std::vector<std::pair<const char*, std::vector<std::string_view>>> kGroups{
-    {"Running a station", {"serve", "demo", "check-config", "certificate", "backup", "restore", "verify"}},
+    {"Running a station",
+     {"serve", "demo", "check-config", "doctor", "support-bundle", "certificate", "backup", "restore", "verify"}},
     {"Robots", {"stop", "watch", "robot", "fluid"}},
     {"Experiments", {"profile", "experiment", "autotune"}},
     {"Recordings",
@@ -113,6 +114,10 @@ void define_command_line(CLI::App& app, CommandLine& line) {
   offer<CheckConfig>(app, "check-config", "Check a configuration and print what it means", line);
   offer<Certificate>(app, "certificate", "Make or renew the station's certificate for TLS", line);
   offer<Backup>(app, "backup", "Copy a station's database, also while it runs, and verify the copy", line);
+  offer<Doctor>(app, "doctor", "Say what is wrong with a station, its machine and its data folder, and what to do",
+                line);
+  offer<SupportBundle>(app, "support-bundle", "Gather what helps others to help, without secrets, in one zip file",
+                       line);
   offer<Restore>(app, "restore", "Make a backup the database of a new data folder", line);
   offer<UserCommand>(app, "user", "Users of a station: add, list, change, remove", line);
   offer<TokenCommand>(app, "token", "API tokens of a station: create, list, revoke", line);

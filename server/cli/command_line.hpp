@@ -34,6 +34,8 @@
 #include "server/cli/experiments/autotune.hpp"
 #include "server/cli/experiments/demo.hpp"
 #include "server/cli/experiments/experiment.hpp"
+#include "server/cli/health/doctor.hpp"
+#include "server/cli/health/support_bundle.hpp"
 #include "server/cli/reference_pages.hpp"
 #include "server/cli/robots/stop.hpp"
 #include "server/cli/robots/watch.hpp"
@@ -59,7 +61,7 @@ using CommandLine =
                  Identify, EstimatorQuestion, Tune, Discretise, Predict, UserCommand, TokenCommand, RobotCommand,
                  FluidCommand, JobCommand, DesignCommand, MetricsQuestion, CompareQuestion, ImpedanceMapQuestion,
                  ReportQuestion, CapsuleQuestion, Reproduce, ReferenceCommand, ProfileQuestion, ExperimentCommand,
-                 Autotune, Demo, StopCommand, WatchCommand, CompletionCommand, ManualCommand>;
+                 Autotune, Demo, StopCommand, WatchCommand, Doctor, SupportBundle, CompletionCommand, ManualCommand>;
 
 // The program with all its commands; the one that is chosen when `app` parses becomes `line`.
 void define_command_line(CLI::App& app, CommandLine& line);

@@ -221,6 +221,10 @@ void read(ConfigFile& file, Config& config) {
                 fmt::format("= '{}' must be one of {}", config.log_level, fmt::join(kLevels, ", ")));
     }
   }
+  if (file.take("log", "format", config.log_format) && config.log_format != "text" && config.log_format != "json") {
+    file.fail(*file.find("log", "format"), "log", "format",
+              fmt::format("= '{}' must be text or json", config.log_format));
+  }
   file.refuse_unknown_keys();
 }
 

@@ -71,7 +71,8 @@ struct Config {
 
   bool real_time = true;  // station.real_time: the loop asks for real-time priority
 
-  std::string log_level = "info";  // log.level: trace, debug, info, warn, error
+  std::string log_level = "info";   // log.level: trace, debug, info, warn, error
+  std::string log_format = "text";  // log.format: text, or json with one object a line
 
   std::filesystem::path database() const { return data_dir / "station.sqlite"; }
   std::filesystem::path tls_certificate() const;

@@ -5,6 +5,7 @@
 
 #include "server/http/answer_head.hpp"
 #include "server/http/http_connection.hpp"
+#include "server/runtime/counted.hpp"
 
 namespace server::http {
 namespace asio = boost::asio;
@@ -36,7 +37,9 @@ HttpServer::HttpServer(runtime::TaskGroup& tasks, runtime::Clock& clock, net::Li
       upgrades_{upgrades} {}
 
 asio::awaitable<void> HttpServer::run() {
-  return listener_.run([this](tcp::socket socket) { on_connection(HttpStream{std::move(socket)}); });
+  const runtime::Counted listening{access_.listening};
+  auto accepted = [this](tcp::socket socket) { on_connection(HttpStream{std::move(socket)}); };
+  co_await listener_.run(accepted);
 }
 
 void HttpServer::on_connection(HttpStream stream) {

@@ -5,6 +5,7 @@
 #include <spdlog/spdlog.h>
 
 #include "server/config/endpoint.hpp"
+#include "server/runtime/counted.hpp"
 
 namespace server::link {
 namespace asio = boost::asio;
@@ -25,6 +26,7 @@ asio::awaitable<void> RobotListener::run() {
   tasks_.spawn("robots' sockets", sockets_.run());
   tasks_.spawn("awaited robots' sockets", sockets_.run_awaited());
   auto on_connection = [this](asio::ip::tcp::socket socket) { accept(tls::StreamSocket{std::move(socket)}); };
+  const runtime::Counted listening{access_.listening};
   co_await listener_.run(on_connection);
 }
 

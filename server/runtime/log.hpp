@@ -1,15 +1,26 @@
-// The station's log: lines to standard error, through spdlog.
+// The station's log: lines to standard error, through spdlog; as text for people, or as a JSON object a line.
+//
+// One entry is one line in either format: control characters are written out (\n, \x1b), so that what a robot or
+// another peer sends can neither forge an entry nor command a terminal.
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <utility>
 
+namespace spdlog {
+class formatter;
+}
+
 namespace server::runtime {
 
-// `level` is trace, debug, info, warn or error.
-void start_log(const std::string& level);
+// `level` is trace, debug, info, warn or error; `format` is text or json.
+void start_log(const std::string& level, const std::string& format = "text");
+
+// How an entry becomes a line.
+std::unique_ptr<spdlog::formatter> log_formatter(const std::string& format);
 
 // Lets one line a second into the log, of what an unauthenticated peer can cause as often as they like.
 class SparseLines {

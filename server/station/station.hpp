@@ -100,6 +100,8 @@ class Station {
   void remember(const CommandRecord& ended);
 
   const StopTimes& stop_times() const;
+  // Of heartbeats of all robots: there and back, without the time that the robot took to answer.
+  const runtime::TimeHistogram& round_trips() const;
   std::uint64_t invalid_values() const;  // of all robots, since the station started
 
   // --- called by robot sessions (link/) ---

@@ -57,6 +57,7 @@ struct StationParts {
   TimedCommands timed{loop, clock, notifier, tracker};
   EventLimit enrolment_refusals{kEventPeriodUs};  // of robots that are not known, whatever their names are
   std::uint64_t invalid_values = 0;               // of all robots, since the station started
+  runtime::TimeHistogram round_trips;             // likewise
   SampleBatch batch;                              // of the frame that is being received; kept for its memory
   std::function<void(const RobotState&, const Author&)> on_fluid_named = [](const RobotState&, const Author&) {};
 };

@@ -79,6 +79,7 @@ TEST_F(ConfigTest, TheDocumentedFileHoldsEveryDefault) {
   EXPECT_EQ(from_file.allow_unattended, defaults.allow_unattended);
   EXPECT_EQ(from_file.real_time, defaults.real_time);
   EXPECT_EQ(from_file.log_level, defaults.log_level);
+  EXPECT_EQ(from_file.log_format, defaults.log_format);
 }
 
 // The error for an unknown option lists all known ones, so each of them can be looked for in the documented file.
@@ -110,6 +111,8 @@ TEST_F(ConfigTest, FlagsGoBeforeTheFileAndMakeAPortBinding) {
 
 TEST_F(ConfigTest, MistakesNameFileLineOptionAndRemedy) {
   EXPECT_THAT(mistake("[log]\nlevel = \"loud\"\n"), HasSubstr("station.toml:2: log.level = 'loud' must be one of"));
+  EXPECT_THAT(mistake("[log]\nformat = \"xml\"\n"),
+              HasSubstr("station.toml:2: log.format = 'xml' must be text or json"));
   EXPECT_THAT(mistake("[robots]\n\nlink_timeout_ms = 5\n"), HasSubstr(":3: robots.link_timeout_ms = 5 is outside 200"));
   EXPECT_THAT(mistake("[robots]\nlink_timeout_ms = \"1\"\n"), HasSubstr("must be a whole number"));
   EXPECT_THAT(mistake("[robots]\nenrol_on_loopback = 1\n"), HasSubstr("must be true or false"));

@@ -7,8 +7,16 @@
 #include <iterator>
 #include <string_view>
 
+#include "server/net/transport_security.hpp"
+#include "server/runtime/exceptions.hpp"
+#include "server/runtime/loop_lateness.hpp"
+#include "server/station/station.hpp"
+#include "server/storage/recording_parts.hpp"
+
 namespace server::api {
 namespace {
+
+constexpr double kUsPerS = 1e6;
 
 class Metrics {
  public:
@@ -18,23 +26,26 @@ class Metrics {
   void gauge(std::string_view name, std::uint64_t value, std::string_view meaning) {
     add(name, "gauge", fmt::to_string(value), meaning);
   }
-  // In seconds, as Prometheus wants it.
-  void histogram(std::string_view name, std::string_view stage, const station::Histogram& times) {
-    constexpr double kUsPerS = 1e6;
-    const auto line = [&](std::string_view suffix, std::string_view bound, auto value) {
-      fmt::format_to(std::back_inserter(text_), "rheonaut_{}{}{{stage=\"{}\"{}}} {}\n", name, suffix, stage, bound,
-                     value);
-    };
+  // Each bound, the sum and the count; `label` is `stage="sent"` or nothing. Divided by `scale`: µs become seconds, as
+  // Prometheus wants them.
+  template <class Counts>
+  void histogram(std::string_view name, std::string_view label, const Counts& counted, double scale) {
     std::uint64_t count = 0;
-    for (std::size_t at = 0; at < times.counts().size(); ++at) {
-      count += times.counts()[at];
-      const bool is_last = at == station::Histogram::kBoundsUs.size();
+    for (std::size_t at = 0; at < counted.counts().size(); ++at) {
+      count += counted.counts()[at];
       const std::string bound =
-          is_last ? "+Inf" : fmt::to_string(static_cast<double>(station::Histogram::kBoundsUs[at]) / kUsPerS);
-      line("_bucket", fmt::format(",le=\"{}\"", bound), count);
+          at == Counts::kBounds.size() ? "+Inf" : fmt::to_string(static_cast<double>(Counts::kBounds[at]) / scale);
+      const std::string_view comma = label.empty() ? "" : ",";
+      fmt::format_to(std::back_inserter(text_), "rheonaut_{}_bucket{{{}{}le=\"{}\"}} {}\n", name, label, comma, bound,
+                     count);
     }
-    line("_sum", "", static_cast<double>(times.sum_us()) / kUsPerS);
-    line("_count", "", count);
+    const std::string labels = label.empty() ? "" : fmt::format("{{{}}}", label);
+    fmt::format_to(std::back_inserter(text_), "rheonaut_{0}_sum{1} {2}\nrheonaut_{0}_count{1} {3}\n", name, labels,
+                   static_cast<double>(counted.sum()) / scale, count);
+  }
+  void times(std::string_view name, const runtime::TimeHistogram& counted, std::string_view meaning) {
+    heading(name, "histogram", meaning);
+    histogram(name, "", counted, kUsPerS);
   }
   void labelled(std::string_view name, std::string_view label, std::string_view of, std::uint64_t value) {
     fmt::format_to(std::back_inserter(text_), "rheonaut_{}{{{}=\"{}\"}} {}\n", name, label, of, value);
@@ -66,7 +77,8 @@ void add_security(Metrics& metrics, const net::TransportSecurity& security) {
   const tls::TlsHandshakes* handshakes = security.handshakes();
   if (handshakes == nullptr) return;
   const auto not_after_s = std::max<std::int64_t>(handshakes->context().certificate.not_after_us / 1'000'000, 0);
-  metrics.gauge("tls_certificate_not_after_s", static_cast<std::uint64_t>(not_after_s), "End of its life, UTC.");
+  metrics.gauge("tls_certificate_not_after_seconds", static_cast<std::uint64_t>(not_after_s),
+                "When it expires, UTC since 1970.");
   metrics.counter("tls_handshakes_total", handshakes->counters().handshakes,
                   "Connections that are in TLS now, or were.");
   metrics.counter("tls_resumed_total", handshakes->counters().resumed, "Of them, those that resumed a session.");
@@ -80,10 +92,33 @@ void add_exceptions(Metrics& metrics, const runtime::ExceptionLog& exceptions) {
     metrics.labelled(kName, "where", text(ended), exceptions.count(ended));
 }
 
+// Robots that are retired or were removed count nowhere.
+void add_robots(Metrics& metrics, const station::Station& station) {
+  std::uint64_t connected = 0, unconfirmed = 0, closed = 0;
+  for (const auto& [id, robot] : station.robots()) {
+    const bool is_connected = robot.link == station::LinkState::connected;
+    connected += is_connected ? 1 : 0;
+    unconfirmed += robot.pending_stop && robot.retired_at_us == 0 ? 1 : 0;
+    closed += is_connected && robot.stop_path.is_measured && !robot.stop_path.is_open ? 1 : 0;
+  }
+  metrics.gauge("robots_connected", connected, "Robots that are connected now.");
+  metrics.gauge("stops_unconfirmed", unconfirmed, "Robots with an emergency stop that they have not confirmed.");
+  metrics.gauge("stop_paths_closed", closed, "Connected robots that a stop would not reach now, as their probes say.");
+  metrics.times("link_round_trip_seconds", station.round_trips(),
+                "Of heartbeats: to a robot and back, without its own time.");
+  const station::StopTimes& stops = station.stop_times();
+  constexpr const char* kStopTimes = "emergency_stop_seconds";
+  metrics.heading(kStopTimes, "histogram", "From the request to each stage of an emergency stop of a connected robot.");
+  metrics.histogram(kStopTimes, R"(stage="sent")", stops.sent, kUsPerS);
+  metrics.histogram(kStopTimes, R"(stage="acknowledged")", stops.acknowledged, kUsPerS);
+  metrics.histogram(kStopTimes, R"(stage="duty_zero_seen")", stops.verified, kUsPerS);
+}
+
 }  // namespace
 
-std::string metrics_text(const storage::RecordingParts& recording, const station::Station& station,
-                         const net::TransportSecurity& security, const runtime::ExceptionLog& exceptions) {
+std::string metrics_text(const RecordingRoutes& parts) {
+  const storage::RecordingParts& recording = parts.recording;
+  const station::Station& station = parts.station;
   const storage::RecorderCounters& counters = recording.recorder.counters();
   const storage::DiskUse& use = recording.disk_watch.use();
   const storage::RetentionCounters& retention = recording.retention.counters();
@@ -110,14 +145,15 @@ std::string metrics_text(const storage::RecordingParts& recording, const station
   metrics.counter("invalid_values_total", station.invalid_values(), "Values of robots' frames that cannot be.");
   metrics.counter("commits_total", counters.commits, "Commits.");
   metrics.counter("commits_failed_total", counters.commits_failed, "Commits that failed and were tried again.");
-  const station::StopTimes& stops = station.stop_times();
-  constexpr const char* kStopTimes = "emergency_stop_seconds";
-  metrics.heading(kStopTimes, "histogram", "From the request to each stage of an emergency stop of a connected robot.");
-  metrics.histogram(kStopTimes, "sent", stops.sent);
-  metrics.histogram(kStopTimes, "acknowledged", stops.acknowledged);
-  metrics.histogram(kStopTimes, "duty_zero_seen", stops.verified);
-  add_security(metrics, security);
-  add_exceptions(metrics, exceptions);
+  metrics.times("commit_seconds", counters.commit_times, "From the beginning of a commit until it is durable.");
+  constexpr const char* kDepth = "queued_samples_at_commit";
+  metrics.heading(kDepth, "histogram", "Samples received and not durable when a commit begins.");
+  metrics.histogram(kDepth, "", counters.samples_at_commit, 1);
+  add_robots(metrics, station);
+  metrics.times("loop_lateness_seconds", parts.lateness.times(),
+                "How late a timer of the loop wakes, four times a second.");
+  add_security(metrics, parts.security);
+  add_exceptions(metrics, parts.exceptions);
   return std::move(metrics).text();
 }
 

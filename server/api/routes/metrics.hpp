@@ -1,20 +1,18 @@
-// Metrics of recording, TLS and failures for Prometheus: text format 0.0.4.
+// Metrics of recording, link, stops, loop, TLS and failures for Prometheus: text format 0.0.4.
 //
 //   # HELP rheonaut_samples_written_total Samples that are durable.
 //   # TYPE rheonaut_samples_written_total counter
 //   rheonaut_samples_written_total 4711
+//
+// docs/operations.md lists the histograms; deploy/prometheus and deploy/grafana use the names.
 #pragma once
 
 #include <string>
 
-#include "server/net/transport_security.hpp"
-#include "server/runtime/exceptions.hpp"
-#include "server/station/station.hpp"
-#include "server/storage/recording_parts.hpp"
+#include "server/api/routes/routes.hpp"
 
 namespace server::api {
 
-std::string metrics_text(const storage::RecordingParts& recording, const station::Station& station,
-                         const net::TransportSecurity& security, const runtime::ExceptionLog& exceptions);
+std::string metrics_text(const RecordingRoutes& parts);
 
 }  // namespace server::api

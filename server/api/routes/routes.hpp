@@ -1,6 +1,6 @@
 // All routes of the API, grouped by noun: routes_station, routes_recording, routes_robots, routes_commands,
-// routes_in_force, routes_fluids, routes_runs, routes_markers, routes_references, routes_reservations, routes_samples,
-// routes_overview, routes_exports, routes_accounts, routes_audit; and those of server/api/analysis.
+// routes_health, routes_in_force, routes_fluids, routes_runs, routes_markers, routes_references, routes_reservations,
+// routes_samples, routes_overview, routes_exports, routes_accounts, routes_audit; and those of server/api/analysis.
 //
 // Held to openapi.yaml both ways by a test. Each answer is a coroutine that can be called without a server.
 #pragma once
@@ -41,6 +41,7 @@ class TransportSecurity;
 
 namespace server::runtime {
 class ExceptionLog;
+class LoopLateness;
 class TaskGroup;
 }  // namespace server::runtime
 
@@ -147,8 +148,10 @@ struct RecordingRoutes {
   station::Station& station;
   net::TransportSecurity& security;
   runtime::ExceptionLog& exceptions;
+  const runtime::LoopLateness& lateness;
 };
 void add_recording_routes(http::Router& router, RecordingRoutes parts);
+void add_health_routes(http::Router& router, RecordingRoutes parts);
 
 struct ReferenceRoutes {
   analysis::AnalysisService& analysis;

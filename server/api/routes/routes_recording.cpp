@@ -81,7 +81,7 @@ http::Answer acknowledge_losses(RecordingRoutes parts, http::Request request) {
 http::Answer get_metrics(RecordingRoutes parts, http::Request) {
   http::Response response;
   response.content_type = "text/plain; version=0.0.4";
-  response.body = metrics_text(parts.recording, parts.station, parts.security, parts.exceptions);
+  response.body = metrics_text(parts);
   co_return response;
 }
 

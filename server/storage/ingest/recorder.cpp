@@ -70,10 +70,7 @@ asio::awaitable<void> Recorder::run() {
 }
 
 asio::awaitable<void> Recorder::wait_for_commit() {
-  if (failing()) {
-    co_await clock_.sleep_until(failure_.retry_at_us());
-    co_return;
-  }
+  if (failing()) co_return co_await clock_.sleep_until(failure_.retry_at_us());
   if (boots_->empty() && queue_->has_no_records() && flushes_.empty() && !quota_.has_left_out()) {
     idle_ = true;
     co_await work_.wait();
@@ -92,6 +89,8 @@ void Recorder::build_commit() {
 
 asio::awaitable<void> Recorder::write() {
   if (!queue_->has_commit()) co_return;
+  const std::int64_t begun_us = clock_.steady_us();
+  counters_.samples_at_commit.add(static_cast<std::int64_t>(queued_samples()));
   const std::string problem = co_await database_.write(queue_->commit());
   if (!problem.empty()) {
     ++counters_.commits_failed;
@@ -99,6 +98,7 @@ asio::awaitable<void> Recorder::write() {
     co_return;
   }
   failure_.on_written();
+  counters_.commit_times.add(clock_.steady_us() - begun_us);
   WriteBatch written = queue_->finish_commit();
   const bool had_samples = counters_.samples_written > 0;
   counters_.count_written(written);

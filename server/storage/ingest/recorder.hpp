@@ -34,6 +34,7 @@
 #include <vector>
 
 #include "server/runtime/clock.hpp"
+#include "server/runtime/histogram.hpp"
 #include "server/runtime/worker.hpp"
 #include "server/station/state/robot_archive.hpp"
 #include "server/station/state/station_sink.hpp"
@@ -71,7 +72,9 @@ struct RecorderCounters {
   std::uint64_t batches_malformed = 0;
   std::uint64_t commits = 0;
   std::uint64_t largest_commit_samples = 0;
-  std::uint64_t commits_failed = 0;  // each was, or is being, tried again
+  std::uint64_t commits_failed = 0;           // each was, or is being, tried again
+  runtime::TimeHistogram commit_times;        // from the loop's request until it is durable; of those that succeeded
+  runtime::DepthHistogram samples_at_commit;  // received and not durable when a commit begins
 
   void count_written(const WriteBatch& written) {
     std::uint64_t samples = 0;

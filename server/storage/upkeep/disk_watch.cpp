@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
+#include <unistd.h>
 
 #include <system_error>
 
@@ -63,6 +64,7 @@ asio::awaitable<void> DiskWatch::look() {
   auto job = [path = database_, before = use_, free_bytes = free_bytes_] {
     DiskUse use = before;  // a file system that does not answer is as it was
     use.database_bytes = file_bytes(path);
+    use.is_writable = ::access(path.c_str(), W_OK) == 0;
     try {
       use.free_bytes = free_bytes(fs::absolute(path).parent_path());
       keep_disk_reserve(path, use.free_bytes);

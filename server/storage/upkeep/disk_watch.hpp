@@ -36,6 +36,7 @@ SpaceState next_state(SpaceState now, std::uint64_t free_bytes, SpaceLimits limi
 struct DiskUse {
   std::uint64_t free_bytes = 0;      // for this user
   std::uint64_t database_bytes = 0;  // of the file
+  bool is_writable = true;           // this user may write the file, as far as the file system says
 };
 
 // How many bytes this user may still write into a folder. Throws std::system_error.

@@ -301,9 +301,9 @@ TEST_F(LinkTest, AStopIsTimedFromItsRequestToDutyZeroInTelemetry) {
   EXPECT_EQ(stop.sent_after_us, 300);
   EXPECT_EQ(stop.acknowledged_after_us, 2300);
   EXPECT_EQ(stop.verified_after_us, 7300);
-  EXPECT_EQ(station.stop_times().sent.sum_us(), 300);
-  EXPECT_EQ(station.stop_times().acknowledged.sum_us(), 2300);
-  EXPECT_EQ(station.stop_times().verified.sum_us(), 7300);
+  EXPECT_EQ(station.stop_times().sent.sum(), 300);
+  EXPECT_EQ(station.stop_times().acknowledged.sum(), 2300);
+  EXPECT_EQ(station.stop_times().verified.sum(), 7300);
 }
 
 TEST_F(LinkTest, AStopThatWaitsForARobotIsNotTimed) {
@@ -316,7 +316,7 @@ TEST_F(LinkTest, AStopThatWaitsForARobotIsNotTimed) {
   robot->acknowledge(robot->commands()[0], rheonaut_COMMAND_RESULT_ACCEPTED, 9);
   clock.settle();
   EXPECT_EQ(sink.commands.back().acknowledged_after_us / 1'000'000, 60) << "the record says how long it took";
-  EXPECT_EQ(station.stop_times().acknowledged.sum_us(), 0);
+  EXPECT_EQ(station.stop_times().acknowledged.sum(), 0);
 }
 
 }  // namespace

@@ -95,13 +95,13 @@ TEST(TelemetryVerifier, KindsThatNoSampleShowsAreKnown) {
 }
 
 TEST(StopTimes, CountsByUpperBound) {
-  station::Histogram times;
+  runtime::TimeHistogram times;
   for (const std::int64_t time_us : {0, 50, 51, 1'000'000, 1'000'001}) times.add(time_us);
   EXPECT_EQ(times.counts().front(), 2u);
   EXPECT_EQ(times.counts()[1], 1u);
   EXPECT_EQ(times.counts()[13], 1u);
   EXPECT_EQ(times.counts().back(), 1u);
-  EXPECT_EQ(times.sum_us(), 2'000'102);
+  EXPECT_EQ(times.sum(), 2'000'102);
 }
 
 }  // namespace

@@ -1,5 +1,5 @@
 // By libsystemd's sd_notify.
-#include "server/runtime/supervision.hpp"
+#include "server/config/supervision.hpp"
 
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
@@ -9,7 +9,7 @@
 #include <cstdint>
 #include <cstring>
 
-namespace server::runtime {
+namespace server::config {
 namespace {
 
 constexpr int kKeepEnvironment = 0;
@@ -28,7 +28,7 @@ struct SaysStopping {
 
 }  // namespace
 
-boost::asio::awaitable<void> tell_supervisor(Clock& clock, std::string status) {
+boost::asio::awaitable<void> tell_supervisor(runtime::Clock& clock, std::string status) {
   constexpr int kSignsInTime = 3;
   std::uint64_t watchdog_us = 0;
   const bool is_watched = sd_watchdog_enabled(kKeepEnvironment, &watchdog_us) > 0;
@@ -42,4 +42,4 @@ boost::asio::awaitable<void> tell_supervisor(Clock& clock, std::string status) {
   }
 }
 
-}  // namespace server::runtime
+}  // namespace server::config

@@ -1,0 +1,187 @@
+// Measures, then judges.
+#include "server/cli/health/machine_checks.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sched.h>
+#include <sys/resource.h>
+#include <sys/timex.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <boost/asio/io_context.hpp>
+#include <cmath>
+#include <fstream>
+#include <sstream>
+
+#include "server/runtime/tasks.hpp"
+#include "server/storage/upkeep/disk_watch.hpp"
+
+namespace server::cli {
+namespace {
+
+constexpr double kSlowSyncMs = 100, kTooSlowSyncMs = 1000;  // a commit each 100 ms; robots keep some 8 s of samples
+constexpr double kMostStepMs = 20;
+constexpr microseconds kClockWatch{std::chrono::milliseconds{250}};
+constexpr std::int64_t kMostFutureUs = 60'000'000;
+constexpr std::uint64_t kOtherFiles = 200;  // database, logs, exports
+constexpr double kUsPerS = 1e6;
+
+double elapsed_ms(std::int64_t from_us, std::int64_t to_us) { return static_cast<double>(to_us - from_us) / 1e3; }
+
+std::optional<double> measure_sync_ms(const std::filesystem::path& folder) {
+  std::string name = (folder / ".doctor-XXXXXX").string();
+  const int file = ::mkstemp(name.data());
+  if (file < 0) return std::nullopt;
+  ::unlink(name.c_str());
+  boost::asio::io_context loop;
+  const runtime::SystemClock clock{loop};
+  const std::array<char, 4096> page{};
+  std::array<double, 5> times{};
+  for (double& time : times) {
+    const std::int64_t begun_us = clock.steady_us();
+    const bool is_written = ::pwrite(file, page.data(), page.size(), 0) == std::ssize(page) && ::fdatasync(file) == 0;
+    if (!is_written) {
+      ::close(file);
+      return std::nullopt;
+    }
+    time = elapsed_ms(begun_us, clock.steady_us());
+  }
+  ::close(file);
+  std::ranges::sort(times);
+  return times[times.size() / 2];
+}
+
+std::uint64_t own_open_files() {
+  rlimit limit{};
+  getrlimit(RLIMIT_NOFILE, &limit);
+  return limit.rlim_max;
+}
+
+// The hard limit, up to which the station raises its own; a line "Max open files  1024  524288  files".
+std::optional<std::uint64_t> open_files_of(int pid) {
+  std::ifstream in{fmt::format("/proc/{}/limits", pid)};
+  for (std::string line; std::getline(in, line);) {
+    if (!line.starts_with("Max open files")) continue;
+    std::istringstream words{line.substr(line.find("files") + 5)};
+    std::uint64_t soft = 0, hard = 0;
+    if (words >> soft >> hard) return hard;
+  }
+  return std::nullopt;
+}
+
+}  // namespace
+
+DiskFacts measure_disk(const std::filesystem::path& data_dir) {
+  return {storage::free_bytes_of(data_dir), measure_sync_ms(data_dir)};
+}
+
+void judge_disk(const DiskFacts& facts, const config::Config& config, Findings& findings) {
+  const storage::SpaceLimits limits = storage::space_limits(config.recording);
+  const storage::SpaceState state = next_state(storage::SpaceState::ok, facts.free_bytes, limits);
+  const std::string free =
+      fmt::format("{} MB are free on the disk of {}", facts.free_bytes / 1'000'000, config.data_dir.string());
+  constexpr const char* kMakeRoom = "make room on the disk, or set recording.retention_days";
+  if (state == storage::SpaceState::ok) {
+    findings.fine("space", free);
+  } else if (state == storage::SpaceState::low) {
+    findings.problem("space", fmt::format("{}, fewer than low_space_mb = {}", free, config.recording.low_space_mb),
+                     kMakeRoom);
+  } else {
+    findings.problem("space",
+                     fmt::format("{}, fewer than critical_space_mb = {}: no run and no backup can be begun", free,
+                                 config.recording.critical_space_mb),
+                     kMakeRoom);
+  }
+  if (!facts.sync_ms) {
+    return findings.problem("disk", fmt::format("no file can be written into {}", config.data_dir.string()),
+                            "run rheonaut doctor as the user that runs the station; else the disk is full, broken, or "
+                            "mounted read-only");
+  }
+  const std::string sync = fmt::format("4 kB are durable after {:.1f} ms", *facts.sync_ms);
+  if (*facts.sync_ms < kSlowSyncMs) return findings.fine("disk", sync);
+  constexpr const char* kFaster =
+      "put the data folder on a faster disk (not a network folder or a slow card), and look "
+      "for other programs that write much";
+  if (*facts.sync_ms < kTooSlowSyncMs) return findings.note("disk", sync + ", which is slow", kFaster);
+  findings.problem("disk", sync + ": a robot that loses its link meanwhile may lose samples", kFaster);
+}
+
+ClockFacts measure_clock() {
+  ClockFacts facts;
+  timex state{};
+  const int answer = adjtimex(&state);
+  if (answer >= 0) facts.is_synchronised = (state.status & STA_UNSYNC) == 0 && answer != TIME_ERROR;
+  boost::asio::io_context loop;
+  runtime::SystemClock clock{loop};
+  const std::int64_t utc_begun_us = clock.utc_us(), steady_begun_us = clock.steady_us();
+  runtime::run_first(loop, clock.sleep_for(kClockWatch));
+  facts.now_us = clock.utc_us();
+  facts.step_ms = elapsed_ms(utc_begun_us, facts.now_us) - elapsed_ms(steady_begun_us, clock.steady_us());
+  return facts;
+}
+
+void judge_clock(const ClockFacts& facts, Findings& findings) {
+  constexpr const char* kSynchronise = "synchronise the clock (apt install chrony, or timedatectl set-ntp true)";
+  const std::int64_t behind_us = facts.recorded_us - facts.now_us;
+  if (facts.recorded_us != 0 && behind_us > kMostFutureUs) {
+    findings.problem("clock",
+                     fmt::format("the clock is {:.0f} s behind what was recorded last: it is wrong now, or was wrong "
+                                 "then",
+                                 static_cast<double>(behind_us) / kUsPerS),
+                     "set the clock before the station starts; retention may keep what was recorded in the future");
+  }
+  if (std::abs(facts.step_ms) > kMostStepMs) {
+    return findings.problem("clock",
+                            fmt::format("the clock jumped by {:.0f} ms while it was watched for 250 ms", facts.step_ms),
+                            "find out which program sets the clock; two time services may work against each other");
+  }
+  if (!facts.is_synchronised) {
+    return findings.note("clock", "the clock runs steadily; the system does not say whether it is synchronised",
+                         kSynchronise);
+  }
+  if (*facts.is_synchronised) return findings.fine("clock", "it is synchronised and runs steadily");
+  findings.note("clock",
+                "the clock runs steadily, but is not synchronised: recorded times may differ from those of "
+                "other machines",
+                kSynchronise);
+}
+
+void check_real_time(const RunningStation& running, const config::Config& config, Findings& findings) {
+  if (!config.real_time) return findings.fine("real time", "it is not asked for (station.real_time = false)");
+  constexpr const char* kPermit =
+      "permit it: LimitRTPRIO=2 in the systemd unit, or a line '@USER - rtprio 2' in "
+      "/etc/security/limits.conf; without it a busy machine may delay a stop";
+  if (running.is_running && running.pid > 0) {
+    const int policy = sched_getscheduler(running.pid) & ~SCHED_RESET_ON_FORK;
+    if (policy == SCHED_RR) return findings.fine("real time", "the station's loop has real-time priority");
+    return findings.note("real time", "the station's loop runs without real-time priority", kPermit);
+  }
+  rlimit limit{};
+  getrlimit(RLIMIT_RTPRIO, &limit);
+  if (limit.rlim_cur >= 2) return findings.fine("real time", "this user may ask for real-time priority");
+  if (geteuid() == 0) return findings.fine("real time", "root may ask for real-time priority");
+  findings.note("real time", "this user may not ask for real-time priority", kPermit);
+}
+
+void check_open_files(const RunningStation& running, const config::Config& config, Findings& findings) {
+  std::optional<std::uint64_t> allowed;
+  if (running.is_running && running.pid > 0) allowed = open_files_of(running.pid);
+  judge_open_files(allowed.value_or(own_open_files()), config, findings);
+}
+
+void judge_open_files(std::uint64_t allowed, const config::Config& config, Findings& findings) {
+  const std::uint64_t wanted = config.http_places.connections + config.robot_places.connections + kOtherFiles;
+  if (allowed >= wanted) {
+    return findings.fine("open files", fmt::format("{} are allowed, {} may be needed", allowed, wanted));
+  }
+  findings.problem("open files",
+                   fmt::format("{} are allowed, and {} may be needed: for {} pages and {} robots", allowed, wanted,
+                               config.http_places.connections, config.robot_places.connections),
+                   fmt::format("allow more (LimitNOFILE={} in the systemd unit, or ulimit -Hn), or lower "
+                               "robots.max_connections",
+                               wanted));
+}
+
+}  // namespace server::cli
