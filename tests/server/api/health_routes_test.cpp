@@ -13,7 +13,10 @@ namespace fs = std::filesystem;
 
 class HealthRoutesTest : public ApiTest {
  protected:
-  explicit HealthRoutesTest(config::Config of_station = {}) : ApiTest{std::move(of_station)} { set_free_bytes(kRoom); }
+  explicit HealthRoutesTest(config::Config of_station = {}) : ApiTest{std::move(of_station)} {
+    set_free_bytes(kRoom);
+    security.robots().listening = 1;  // this station has a robot without a port
+  }
 
   static constexpr std::uint64_t kRoom = 50'000'000'000;
 

@@ -42,13 +42,13 @@ TEST_F(RightsTest, EveryRouteIsOpenToTheRolesThatItsScopeNamesAndToNoOther) {
   EXPECT_GT(open["admin"], open["operator"]);
 }
 
-TEST_F(RightsTest, WithoutACredentialOnlySigningInIsThere) {
+TEST_F(RightsTest, WithoutACredentialOnlySigningInAndHealthAreThere) {
   scopes = {};
   std::set<std::string> open;
   for (const http::Route& route : api->router().routes()) {
     if (!refused(route)) open.insert(route.method + " " + route.pattern);
   }
-  EXPECT_EQ(open, (std::set<std::string>{"GET /login", "POST /api/v1/login"}));
+  EXPECT_EQ(open, (std::set<std::string>{"GET /healthz", "GET /login", "GET /readyz", "POST /api/v1/login"}));
 }
 
 // Written out, so that a route that changes its scope by accident is noticed here.
