@@ -42,6 +42,10 @@ install(FILES ${PROJECT_SOURCE_DIR}/README.md ${PROJECT_SOURCE_DIR}/CHANGELOG.md
 install(FILES ${PROJECT_SOURCE_DIR}/LICENSE DESTINATION share/doc/rheonaut RENAME copyright)
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/docs/ DESTINATION share/doc/rheonaut/docs FILES_MATCHING PATTERN "*.md" PATTERN "*.svg"
   PATTERN decisions EXCLUDE PATTERN images EXCLUDE)
+install(DIRECTORY ${PROJECT_SOURCE_DIR}/deploy/proxy ${PROJECT_SOURCE_DIR}/deploy/prometheus
+  ${PROJECT_SOURCE_DIR}/deploy/grafana DESTINATION share/doc/rheonaut/deploy)
+install(FILES ${PROJECT_SOURCE_DIR}/web/node_modules/@fontsource/b612/LICENSE DESTINATION share/doc/rheonaut
+  RENAME copyright.b612)  # the page's font
 install(PROGRAMS ${debian}/backup-daily DESTINATION libexec/rheonaut)
 
 set(CPACK_GENERATOR DEB)

@@ -184,8 +184,10 @@ void Station::on_clock(RobotLink& link, const ClockExchange& exchange) {
   RobotEntry* entry = RobotTable::of(link);
   if (entry == nullptr) return;
   RobotState& robot = entry->robot;
-  parts_->round_trips.add((exchange.answer_received_at_us - exchange.sent_at_us) -
-                          (exchange.answered_at_robot_us - exchange.received_at_robot_us));
+  const std::int64_t held_us = exchange.answered_at_robot_us - exchange.received_at_robot_us;
+  const std::int64_t round_trip_us = exchange.answer_received_at_us - exchange.sent_at_us - held_us;
+  // Times of a robot that cannot be: they would spoil the sum for all robots.
+  if (held_us >= 0 && round_trip_us >= 0) parts_->round_trips.add(round_trip_us);
   const std::int64_t utc_minus_steady_us = parts_->clock.utc_us() - parts_->clock.steady_us();
   const auto report = entry->reported.add(exchange, robot, utc_minus_steady_us);
   robot.clock = report.estimate;

@@ -82,7 +82,8 @@ class DebianTree:
         """systemd as process 1, with a network of its own: the service's ports are free there."""
         (self.folder / "console").touch()
         environment = {**ENVIRONMENT, "TREE": str(self.tree), "CONSOLE": str(self.folder / "console")}
-        self.container = subprocess.Popen(["unshare", "-mpfiun", "--kill-child", "bash", "-c", BOOT], env=environment,
+        self.container = subprocess.Popen(["setpriv", "--pdeathsig", "KILL", "unshare", "-mpfiunC", "--kill-child", "bash", "-c",
+                                           BOOT], env=environment,
                                           stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         children = pathlib.Path(f"/proc/{self.container.pid}/task/{self.container.pid}/children")
         self.wait(lambda: children.read_text().split(), "the container")

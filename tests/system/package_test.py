@@ -73,6 +73,7 @@ class PackageTest(unittest.TestCase):
         self.assertIn(f"rheonaut:x:{state.st_uid}:", self.path("/etc/passwd").read_text())
         checked = self.tree.run("rheonaut", "check-config", "--config", "/etc/rheonaut/rheonaut.toml").stdout
         self.assertIn("/var/lib/rheonaut", checked)
+        self.assertIn("rheonaut/remove-data", self.tree.run("debconf-show", "rheonaut").stdout)  # a purge can ask
         for page in ("rheonaut", "rheonaut-serve", "rheonaut-stop", "rheonaut-sim"):
             self.assertTrue(self.path(f"/usr/share/man/man1/{page}.1.gz").exists(), page)
         self.assertIn("_rheonaut", self.path("/usr/share/bash-completion/completions/rheonaut").read_text())

@@ -91,19 +91,21 @@ class StopTest(unittest.TestCase):
                 processes["sim-1"].send_signal(signal.SIGCONT)
             self.assert_latched(station, "sim-1")
 
-    def test_without_an_answer_of_the_station_it_ends_and_says_that_nothing_was_stopped(self):
+    def test_without_an_answer_of_the_station_it_ends_and_says_what_is_known(self):
         with lab() as place:
             missing = self.stop(place)
             self.assertEqual((missing.returncode, missing.stdout), (1, ""))
-            self.moving(place, "sim-1")
+            station, _ = self.moving(place, "sim-1")
             place.station_process.send_signal(signal.SIGSTOP)
             try:
                 for words in (("sim-1",), ("--all",)):
                     hung = self.stop(place, *words)
                     self.assertEqual((hung.returncode, hung.stdout), (1, ""))
-                    self.assertRegex(hung.stderr, r"^rheonaut: .*has not answered within 5000 ms; NOTHING WAS STOPPED")
+                    self.assertRegex(hung.stderr, r"^rheonaut: .*has not answered within 7000 ms; IT IS NOT KNOWN")
             finally:
                 place.station_process.send_signal(signal.SIGCONT)
+            # The request had arrived: the robot is stopped once the station runs again.
+            self.assert_latched(station, "sim-1")
             place.kill_station()
             dead = self.stop(place, "sim-1")
             self.assertEqual((dead.returncode, dead.stdout), (1, ""))

@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <exception>
 #include <memory>
 #include <utility>
 
@@ -40,12 +41,20 @@ asio::awaitable<Result<void>> write_all(ExportParts parts, std::shared_ptr<stora
   co_return Result<void>{};
 }
 
-// Ended on the thread that has started it, whatever becomes of the job.
+// SAFETY: ended on the thread that follows it, whatever becomes of the job: waiting for its end would hold up stops
+// here.
 asio::awaitable<Result<void>> write_by_child(ExportParts parts, storage::ExportOrder order, storage::JobRun& run) {
   auto child = std::make_shared<storage::ExportChild>(order);
-  const auto written = co_await write_all(parts, child, order.file, run);
+  Result<void> written;
+  std::exception_ptr failure;
+  try {
+    written = co_await write_all(parts, child, order.file, run);
+  } catch (...) {
+    failure = std::current_exception();
+  }
   auto end = [last = std::move(child)]() mutable { last.reset(); };
   co_await parts.exports.reader().run(std::move(end));
+  if (failure) std::rethrow_exception(failure);
   co_return written;
 }
 

@@ -21,7 +21,8 @@ namespace http = boost::beast::http;
 namespace {
 
 template <class Stream>
-asio::awaitable<StationAnswer> exchange_async(Stream& stream, const HttpRequest& request) {
+asio::awaitable<StationAnswer> exchange_async(Stream& stream, const HttpRequest& request, bool& may_have_arrived) {
+  may_have_arrived = true;
   co_await http::async_write(stream, request, asio::use_awaitable);
   boost::beast::flat_buffer buffer;
   http::response_parser<http::string_body> parser;
@@ -30,21 +31,22 @@ asio::awaitable<StationAnswer> exchange_async(Stream& stream, const HttpRequest&
   co_return answer_of(parser.release());
 }
 
-asio::awaitable<StationAnswer> connect_and_exchange_async(const StationPlace& place, const HttpRequest& request) {
+asio::awaitable<StationAnswer> connect_and_exchange_async(const StationPlace& place, const HttpRequest& request,
+                                                          bool& may_have_arrived) {
   asio::ip::tcp::socket socket{co_await asio::this_coro::executor};
   co_await socket.async_connect(place.endpoint, asio::use_awaitable);
-  if (place.certificate.empty()) co_return co_await exchange_async(socket, request);
+  if (place.certificate.empty()) co_return co_await exchange_async(socket, request, may_have_arrived);
   asio::ssl::context context{asio::ssl::context::tls_client};
   asio::ssl::stream<asio::ip::tcp::socket&> stream{socket, context};
   co_await stream.async_handshake(asio::ssl::stream_base::client, asio::use_awaitable);
   check_certificate(stream.native_handle(), place.certificate);
-  co_return co_await exchange_async(stream, request);
+  co_return co_await exchange_async(stream, request, may_have_arrived);
 }
 
 // Never throws but at its cancellation: what went wrong is the text of the answer.
 asio::awaitable<void> ask_one(const StationPlace& place, const HttpRequest& request, StationAnswer& answer) {
   try {
-    answer = co_await connect_and_exchange_async(place, request);
+    answer = co_await connect_and_exchange_async(place, request, answer.may_have_arrived);
   } catch (...) {
     const std::exception_ptr failure = std::current_exception();
     if (runtime::is_cancellation(failure)) throw;  // its time is up

@@ -15,9 +15,10 @@ struct StationRequest {
 };
 
 struct StationAnswer {
-  int status = 0;       // 0: there is no answer
-  nlohmann::json body;  // of an error: problem details; null of a page
-  std::string text;     // of what is not JSON; without an answer, why
+  int status = 0;                 // 0: there is no answer
+  nlohmann::json body;            // of an error: problem details; null of a page
+  std::string text;               // of what is not JSON; without an answer, why
+  bool may_have_arrived = false;  // of a request without an answer: the station may have got it and acted
 };
 
 // Where the station listens.

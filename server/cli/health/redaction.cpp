@@ -63,17 +63,24 @@ std::string without_hosts(std::string text) {
 
 // "password = hunter2", "Authorization: Bearer abc", "code=abc": the word after such a name.
 std::string without_named_values(std::string text) {
-  constexpr std::array<std::string_view, 9> kNames{"token",  "password", "passwd", "secret",       "bearer",
-                                                   "cookie", "code=",    "apikey", "authorization"};
+  constexpr std::array<std::string_view, 13> kNames{"token",  "password", "passwd",  "secret",  "bearer",
+                                                    "cookie", "code=",    "apikey",  "api-key", "authorization",
+                                                    "psk",    "pwd",      "wifi key"};
   const std::string lower = lower_case(text);
   std::vector<std::pair<std::size_t, std::size_t>> found;  // begin and end of each value
   for (const std::string_view name : kNames) {
     for (auto at = lower.find(name); at != std::string::npos; at = lower.find(name, at + 1)) {
       std::size_t begin = at + name.size();
-      while (begin < text.size() && (is_letter(text[begin]) || text[begin] == '_')) ++begin;  // "tokens", "token_hash"
+      while (begin < text.size() && (is_letter(text[begin]) || std::string_view{"_-"}.contains(text[begin])))
+        ++begin;  // "tokens", "token_hash"
       while (begin < text.size() && std::string_view{" \t\"'=:\\"}.contains(text[begin])) ++begin;
       std::size_t end = begin;
-      while (end < text.size() && !is_space(text[end]) && !std::string_view{"\"',;&|)}<>"}.contains(text[end])) ++end;
+      // These have several words: all of the line goes.
+      const bool is_header = name == "cookie" || name == "authorization";
+      if (is_header) end = std::min(text.find('\n', begin), text.size());
+      while (end < text.size() && !is_header && !is_space(text[end]) &&
+             !std::string_view{"\"',;&|)}<>"}.contains(text[end]))
+        ++end;
       const bool names_scheme = lower.compare(begin, end - begin, "bearer") == 0;
       if (end > begin && !names_scheme) found.emplace_back(begin, end);
     }

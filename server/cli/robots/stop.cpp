@@ -16,14 +16,20 @@ namespace {
 
 using nlohmann::json;
 
-// SAFETY: longer than the station itself waits for a robot (1.5 s), so that its answer is never missed; and an end, so
-// that the person is told to use another switch while there is time.
-constexpr microseconds kStopPatience{5'000'000};
+// SAFETY: longer than the station itself takes for its answer (1.5 s for robots, 3 s for the disk), so that the answer
+// is not missed; and an end, so that the person is told to use another switch while there is time.
+constexpr microseconds kStopPatience{7'000'000};
 
 constexpr microseconds kExplanationPatience{1'000'000};
 constexpr std::size_t kMostExplained = 20;  // connections at once
 
 constexpr const char* kNothingStopped = "{}; NOTHING WAS STOPPED by this command: switch the robots off by hand";
+constexpr const char* kNotKnown = "{}; IT IS NOT KNOWN whether anything was stopped: switch the robots off by hand";
+
+// SAFETY: a station that got the request stops the robots also when its answer is lost.
+[[noreturn]] void throw_unanswered(const StationAnswer& answer, const std::string& why) {
+  throw std::runtime_error{answer.may_have_arrived ? fmt::format(kNotKnown, why) : fmt::format(kNothingStopped, why)};
+}
 
 // What became of the stop of one robot.
 struct StopOutcome {
@@ -35,7 +41,7 @@ struct StopOutcome {
 
 // SAFETY: only what the robot itself has acknowledged counts as a stop; sent or queued is not enough.
 bool is_confirmed(const json& record) {
-  const auto state = record.at("state").get<std::string>();
+  const json state = record.value("state", json());
   return state == "acknowledged" || state == "verified";
 }
 
@@ -62,6 +68,11 @@ void explain(const StationClient& station, std::vector<StopOutcome>& outcomes) {
   }
 }
 
+std::string text_in(const json& object, const char* name) {
+  const json value = object.value(name, json());
+  return value.is_string() ? value.get<std::string>() : "?";
+}
+
 std::string refusal_in(const StationAnswer& answer) {
   if (answer.status == 0) return answer.text;
   const std::string detail = answer.body.is_object() ? answer.body.value("detail", std::string{}) : std::string{};
@@ -76,7 +87,8 @@ std::vector<StopOutcome> stop_each(const StationClient& station, std::vector<std
   const std::vector<StationAnswer> answers = station.ask_at_once(requests, kStopPatience);
   const auto is_silent = [](const StationAnswer& answer) { return answer.status == 0; };
   if (std::ranges::all_of(answers, is_silent)) {
-    throw std::runtime_error{fmt::format(kNothingStopped, answers.front().text)};
+    const auto arrived = std::ranges::find_if(answers, &StationAnswer::may_have_arrived);
+    throw_unanswered(arrived == answers.end() ? answers.front() : *arrived, answers.front().text);
   }
   std::vector<StopOutcome> outcomes;
   for (std::size_t i = 0; i < robots.size(); ++i) {
@@ -93,16 +105,20 @@ std::vector<StopOutcome> stop_each(const StationClient& station, std::vector<std
 std::vector<StopOutcome> stop_all(const StationClient& station) {
   const StationAnswer answer = station.ask_at_once({{"POST", "/api/v1/emergency-stop"}}, kStopPatience).front();
   if (!answer.body.is_object() || !answer.body.contains("commands")) {
-    throw std::runtime_error{fmt::format(kNothingStopped, refusal_in(answer))};
+    throw_unanswered(answer, refusal_in(answer));
   }
+  // Whatever is missing here, of a station of another version, is not confirmed.
   std::vector<StopOutcome> outcomes;
-  for (const json& record : answer.body.at("commands")) {
-    outcomes.push_back(outcome_of(record.at("robot_id").get<std::string>(), record));
+  for (const json& record : answer.body.at("commands"))
+    outcomes.push_back(outcome_of(text_in(record, "robot_id"), record));
+  const json summary = answer.body.value("summary", json::object());
+  for (const json& one : summary.value("not_acknowledged", json::array())) {
+    if (text_in(one, "outcome") != "failed") continue;
+    outcomes.push_back({text_in(one, "robot_id"), false, nullptr, "the station failed; its log says why"});
   }
-  for (const json& one : answer.body.at("summary").at("not_acknowledged")) {
-    if (one.at("outcome") != "failed") continue;
-    outcomes.push_back({one.at("robot_id").get<std::string>(), false, nullptr, "the station failed; its log says why"});
-  }
+  const std::int64_t left_out = summary.value("left_out", std::int64_t{0});
+  const auto missing = summary.value("robots", std::int64_t{0}) - left_out - std::ssize(outcomes);
+  if (missing > 0) outcomes.push_back({fmt::format("{} more", missing), false, nullptr, "the page names them"});
   return outcomes;
 }
 
@@ -123,22 +139,26 @@ void write_as_json(std::ostream& out, const std::vector<StopOutcome>& outcomes, 
   write_json(out, answer);
 }
 
+std::string after_text(const json& record) {
+  constexpr double kUsPerMs = 1000;
+  const json after_us = record.value("acknowledged_after_us", json());
+  return after_us.is_number() ? fmt::format(" after {:.1f} ms", after_us.get<double>() / kUsPerMs) : "";
+}
+
 // Those that are not confirmed come last, where the person looks first.
 void write_as_text(std::ostream& out, std::vector<StopOutcome> outcomes, std::int64_t answered_after_us) {
-  constexpr double kUsPerMs = 1000;
   std::ranges::sort(outcomes, {}, [](const StopOutcome& one) { return std::pair{!one.is_confirmed, one.robot_id}; });
   std::size_t width = 0;
   for (const StopOutcome& one : outcomes) width = std::max(width, one.robot_id.size());
   for (const StopOutcome& one : outcomes) {
-    const std::string said = one.is_confirmed
-                                 ? fmt::format("stopped: the robot confirmed after {:.1f} ms",
-                                               one.record.at("acknowledged_after_us").get<double>() / kUsPerMs)
-                                 : "NOT CONFIRMED: " + one_line(one.why);
+    const std::string said = one.is_confirmed ? fmt::format("stopped: the robot confirmed{}", after_text(one.record))
+                                              : "NOT CONFIRMED: " + one_line(one.why);
     fmt::print(out, "{:<{}}  {}\n", one_line(one.robot_id), width, said);
   }
+  if (outcomes.empty()) fmt::print(out, "this station knows no robot\n");
   fmt::print(out, "{} of {} robots confirmed; the station answered after {:.0f} ms\n",
              std::ranges::count_if(outcomes, &StopOutcome::is_confirmed), outcomes.size(),
-             static_cast<double>(answered_after_us) / kUsPerMs);
+             static_cast<double>(answered_after_us) / 1000);
 }
 
 StationClient client_of(const std::filesystem::path& data_dir) {
@@ -160,7 +180,8 @@ void add_options(CLI::App& command, StopCommand& options) {
   add_json_flag(command, options.form);
   command.footer(
       "The motor stays off until somebody resets the emergency (clear_emergency). Everybody may stop.\n"
-      "Exit status 5: a robot has not confirmed; 1: the station does not answer, nothing was stopped.\n"
+      "Exit status 5: a robot has not confirmed; 1: the station does not answer. Then switch the robots off by hand.\n"
+      "Of the service: sudo -u rheonaut rheonaut stop --data /var/lib/rheonaut\n"
       "Example: rheonaut stop --data lab\n"
       "Example: rheonaut stop sim-1 sim-2 --data lab");
 }
@@ -178,7 +199,8 @@ int run(const StopCommand& options, std::ostream& out) {
   } else {
     write_as_text(out, outcomes, answered_after_us);
   }
-  return std::ranges::all_of(outcomes, &StopOutcome::is_confirmed) ? 0 : kNotConfirmed;
+  const bool is_done = !outcomes.empty() && std::ranges::all_of(outcomes, &StopOutcome::is_confirmed);
+  return is_done ? 0 : kNotConfirmed;
 }
 
 }  // namespace server::cli

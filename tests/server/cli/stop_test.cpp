@@ -75,6 +75,32 @@ TEST_F(StopTool, WhatTheRobotHasNotAcknowledgedIsNotConfirmed) {
   EXPECT_FALSE(answer.json()["robots"][0]["confirmed"].get<bool>());
 }
 
+TEST_F(StopTool, AStationWithoutRobotsHasStoppedNothing) {
+  const std::string none = R"({"commands":[],"summary":{"robots":0,"left_out":0,"not_acknowledged":[]}})";
+  const SlowStation station{folder_ / "data", {none}};
+  const Answer answer = ask("stop --data @data");
+  EXPECT_EQ(answer.exit_code, 5);
+  EXPECT_THAT(answer.text, ::testing::HasSubstr("this station knows no robot"));
+}
+
+// SAFETY: more robots than an answer names are not forgotten.
+TEST_F(StopTool, RobotsThatTheAnswerDoesNotNameAreNotConfirmed) {
+  const std::string some =
+      R"({"commands":[)" + confirmed("a") + R"(],"summary":{"robots":3,"left_out":1,"not_acknowledged":[]}})";
+  const SlowStation station{folder_ / "data", {some}};
+  const Answer answer = ask("stop --data @data");
+  EXPECT_EQ(answer.exit_code, 5);
+  EXPECT_THAT(answer.text, ::testing::HasSubstr("1 more  NOT CONFIRMED"));
+}
+
+// SAFETY: a request whose answer is lost may have stopped the robots.
+TEST_F(StopTool, AnAnswerThatBreaksOffLeavesItOpenWhatWasStopped) {
+  const SlowStation station{folder_ / "data", {"{"}};
+  const Answer answer = ask("stop a --data @data");
+  EXPECT_EQ(answer.exit_code, 1);
+  EXPECT_THAT(answer.error, ::testing::HasSubstr("IT IS NOT KNOWN"));
+}
+
 TEST_F(StopTool, WithoutAStationItSaysThatNothingWasStopped) {
   const Answer answer = ask("stop --data @nowhere");
   EXPECT_EQ(answer.exit_code, 1);
