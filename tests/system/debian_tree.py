@@ -50,8 +50,20 @@ class DebianTree:
         self.tree = self.folder / "tree"
         self.container = self.init = None
 
-    def make(self):
-        """From the archive that this machine's apt uses."""
+    def make(self, tries=3):
+        """From the archive that this machine's apt uses; again when a download breaks off. Raises CalledProcessError."""
+        for left in reversed(range(tries)):
+            try:
+                self._make()
+                subprocess.run(["chroot", str(self.tree), "apt-get", "update", "-qq"], check=True, capture_output=True,
+                               text=True, timeout=300, env=ENVIRONMENT)
+                return
+            except subprocess.CalledProcessError:
+                shutil.rmtree(self.tree, ignore_errors=True)
+                if left == 0:
+                    raise
+
+    def _make(self):
         asked = subprocess.run(["apt-get", "indextargets", "--format", "$(REPO_URI) $(CODENAME)", "Created-By: Packages"],
                                capture_output=True, text=True, check=True).stdout
         mirror = next(line.split()[0] for line in asked.splitlines() if line.split()[1] == "bookworm")
@@ -66,7 +78,7 @@ class DebianTree:
             elif source.exists():
                 shutil.copy(source, apt / name)
         dump = subprocess.run(["apt-config", "dump"], capture_output=True, text=True, check=True).stdout
-        fetching = [line for line in dump.splitlines() if line.startswith("Acquire::")]
+        fetching = [line for line in dump.splitlines() if line.startswith("Acquire::")] + ['Acquire::Retries "5";']
         (apt / "apt.conf.d" / "90machine").write_text("\n".join(fetching) + "\n")
         for name in ("resolv.conf", "hosts"):
             shutil.copy(f"/etc/{name}", self.tree / "etc" / name)
