@@ -2,9 +2,11 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cstdio>
 #include <sstream>
+#include <string_view>
 #include <vector>
 
 #include "tests/goldens/golden_file.hpp"
@@ -25,14 +27,19 @@ std::string printed_by(const std::string& command) {
   return text;
 }
 
-// The words under the heading "Subcommands:".
+// The first words under each heading of commands.
 std::vector<std::string> commands_in(const std::string& help) {
   std::vector<std::string> commands;
-  const auto heading = help.find("\nSubcommands:\n");
-  if (heading == std::string::npos) return commands;
-  std::istringstream lines{help.substr(help.find('\n', heading + 1) + 1)};
-  for (std::string line; std::getline(lines, line) && line.starts_with("  ");) {
-    if (line[2] != ' ') commands.push_back(line.substr(2, line.find(' ', 2) - 2));
+  if (!help.contains("COMMAND")) return commands;  // in the line of usage
+  constexpr std::array<std::string_view, 4> kOtherHeadings{"Options:", "Arguments:", "Example:", "Examples:"};
+  bool is_of_commands = false;
+  std::istringstream lines{help};
+  for (std::string line; std::getline(lines, line);) {
+    if (!line.starts_with(' ')) {
+      is_of_commands = line.ends_with(':') && std::ranges::find(kOtherHeadings, line) == kOtherHeadings.end();
+    } else if (is_of_commands && line.starts_with("  ") && line[2] != ' ') {
+      commands.push_back(line.substr(2, line.find(' ', 2) - 2));
+    }
   }
   return commands;
 }
