@@ -74,7 +74,7 @@ TEST_F(BadInput, Exports) {
   EXPECT_THAT(complaint(run + "--format csv"), HasSubstr("there is no"));
   EXPECT_THAT(complaint(run + "--format csv --channels duty,volume"), HasSubstr("'volume' is no channel"));
   EXPECT_THAT(complaint(run + "--format sqlite --grid-us 10000"), HasSubstr("--grid-us is for csv and mat"));
-  EXPECT_THAT(ask(run + "--format xls").error, HasSubstr("must be one of csv, mat, sqlite, is 'xls'"));
+  EXPECT_THAT(ask(run + "--format xls").error, HasSubstr("must be one of csv, mat, sqlite, mcap, is 'xls'"));
   EXPECT_THAT(ask(run + "--format csv --grid-us 1").error, HasSubstr("--grid-us must be"));
   EXPECT_TRUE(std::filesystem::is_empty(folder_));
 }

@@ -69,7 +69,7 @@ TEST_F(CertificateTest, ARenewalKeepsKeyNamesAndAuthorityByDefault) {
 
 TEST_F(CertificateTest, ANameThatIsNoneIsRefusedBeforeAnythingIsMade) {
   const Answer refused = ask("certificate --data @lab --name lab_pc,DNS:evil.example");
-  EXPECT_EQ(refused.exit_code, 1);
+  EXPECT_EQ(refused.exit_code, 2);
   EXPECT_THAT(refused.error, HasSubstr("'lab_pc,DNS:evil.example'"));
   EXPECT_FALSE(fs::exists(folder_ / "lab"));
 }

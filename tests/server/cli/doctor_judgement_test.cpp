@@ -67,7 +67,11 @@ TEST(Redaction, RemovesSecretsInEveryFormAndLeavesWords) {
   EXPECT_EQ(redaction.of("open https://anna:pw@lab.example:8080/login?code=a1 now"),
             "open https://[removed]/login now");
   EXPECT_EQ(redaction.of("password=hunter2, done"), "password=[removed], done");
-  EXPECT_EQ(redaction.of("Authorization: Bearer abc123"), "Authorization: Bearer [removed]");
+  EXPECT_EQ(redaction.of("Authorization: Bearer abc123"), "Authorization: [removed]");
+  EXPECT_EQ(redaction.of("Authorization: Basic YTpi\nCookie: a=1; session=b\nnext"),
+            "Authorization: [removed]\nCookie: [removed]\nnext");
+  EXPECT_EQ(redaction.of("X-Token-Id: abc"), "X-Token-Id: [removed]");
+  EXPECT_EQ(redaction.of("psk=hunter2"), "psk=[removed]");
   EXPECT_EQ(redaction.of("a -----BEGIN KEY-----\nAAA\n-----END KEY----- b"), "a [removed] b");
   EXPECT_EQ(redaction.of("a -----BEGIN KEY-----\nAAA"), "a [removed]") << "one that was cut";
   EXPECT_THAT(redaction.of("9f86d081884c7d659a2feaa0c55ad015"), Not(HasSubstr("9f86")));

@@ -189,7 +189,7 @@ TEST_F(Identifying, APlanPredictsTheUncertaintyOfAnExperiment) {
   const auto prbs = ask("identify --plan --json").json();
   EXPECT_NEAR(prbs["one_sigma"]["alpha"], 0.021, 0.006);
   EXPECT_THAT(ask("identify --plan --plan-duty step --plan-amplitude 0.3").text, HasSubstr("relative (%)"));
-  EXPECT_EQ(ask("identify --plan --plan-dt-s 1e-9").exit_code, 1);
+  EXPECT_EQ(ask("identify --plan --plan-dt-s 1e-9").exit_code, 2);
 }
 
 }  // namespace
