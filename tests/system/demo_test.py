@@ -61,6 +61,14 @@ class DemoTest(unittest.TestCase):
         with sqlite3.connect(f"file:{self.data / 'station.sqlite'}?mode=ro", uri=True) as database:
             self.assertEqual(1, database.execute("SELECT count(*) FROM run").fetchone()[0])
 
+    def test_an_interrupt_in_the_middle_of_the_experiment_ends_it(self):
+        process = self.start()
+        wait_until(lambda: "setpoint 100.0 mm" in self.said(), 100, "the robot on its way")
+        process.send_signal(signal.SIGINT)
+        self.assertEqual(0, process.wait(timeout=60), self.said())
+        self.assertIn("ended", self.said())
+        self.assertEqual([], running_in(self.data))
+
     def test_nothing_outlives_a_demo_that_is_killed(self):
         process = self.start()
         wait_until(lambda: (self.data / "endpoints.json").exists(), 60, "the station")

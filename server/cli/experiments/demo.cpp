@@ -49,6 +49,11 @@ class Patience {
     loop_.run_for(time);
     if (has_come_) throw Interrupted{};
   }
+  bool is_interrupted() {
+    loop_.restart();
+    loop_.poll();
+    return has_come_;
+  }
 
  private:
   boost::asio::io_context loop_{1};
@@ -242,6 +247,9 @@ int run(const Demo& options, std::ostream&) {
     }
   } catch (const Interrupted&) {
     say("\nended");
+  } catch (const std::exception&) {
+    if (!patience.is_interrupted()) throw;
+    say("\nended");  // the signal broke a request off
   }
   return status;
 }
