@@ -12,12 +12,15 @@ target_compile_options(firmware_dialect INTERFACE
   $<$<COMPILE_LANGUAGE:CXX>:-fno-exceptions -fno-rtti -Wdouble-promotion -Wfloat-conversion -ffp-contract=off>)
 
 # RHEONAUT_SANITIZE: a list for -fsanitize, empty for none. `enum` is left out because protobuf enumerators are open:
-# a newer peer may send a value that this version does not know.
+# a newer peer may send a value that this version does not know. Checks of each pointer take a third of the compiler's
+# time: `null` and `object-size` are left to the address sanitizer; `alignment` is for what also runs on the robot, whose
+# processor has no unaligned access.
 set(RHEONAUT_SANITIZE "" CACHE STRING "Sanitizers, as for -fsanitize=")
 if(RHEONAUT_SANITIZE)
   add_compile_options(-fsanitize=${RHEONAUT_SANITIZE} -fno-sanitize-recover=all -fno-omit-frame-pointer)
   if(RHEONAUT_SANITIZE MATCHES "undefined")
-    add_compile_options(-fno-sanitize=enum)
+    add_compile_options(-fno-sanitize=enum,null,object-size,alignment)
+    target_compile_options(firmware_dialect INTERFACE -fsanitize=alignment)
   endif()
   add_link_options(-fsanitize=${RHEONAUT_SANITIZE})
 endif()

@@ -18,13 +18,19 @@ add_custom_command(
     $<TARGET_FILE:rheonaut-export> > ${package_files}/sbom.cdx.json
   DEPENDS rheonaut rheonaut-sim rheonaut-export ${PROJECT_SOURCE_DIR}/deploy/sbom ${PROJECT_SOURCE_DIR}/web/package-lock.json)
 
+# Whose licences they have. The page's packages are there once the page is built.
+add_custom_command(
+  OUTPUT ${package_files}/copyright
+  COMMAND ${PYTHON3} ${PROJECT_SOURCE_DIR}/deploy/sbom --licences > ${package_files}/copyright
+  DEPENDS rheonaut ${PROJECT_SOURCE_DIR}/LICENSE ${PROJECT_SOURCE_DIR}/deploy/sbom ${PROJECT_SOURCE_DIR}/web/package-lock.json)
+
 # Manual pages and completions, from the command line's own definition.
 set(pages ${package_files}/man1/rheonaut.1.gz)
 add_custom_command(
   OUTPUT ${pages}
   COMMAND ${PROJECT_SOURCE_DIR}/deploy/pages $<TARGET_FILE:rheonaut> $<TARGET_FILE:rheonaut-sim> ${package_files}
   DEPENDS rheonaut rheonaut-sim ${PROJECT_SOURCE_DIR}/deploy/pages)
-add_custom_target(package_files ALL DEPENDS ${package_files}/sbom.cdx.json ${pages})
+add_custom_target(package_files ALL DEPENDS ${package_files}/sbom.cdx.json ${package_files}/copyright ${pages})
 install(DIRECTORY ${package_files}/man1 DESTINATION share/man)
 install(FILES ${package_files}/rheonaut.bash DESTINATION share/bash-completion/completions RENAME rheonaut)
 install(FILES ${package_files}/rheonaut-sim.bash DESTINATION share/bash-completion/completions RENAME rheonaut-sim)
@@ -38,14 +44,11 @@ install(FILES ${package_files}/rheonaut.toml DESTINATION /etc/rheonaut)
 install(FILES ${debian}/rheonaut.service ${debian}/rheonaut-backup.service ${debian}/rheonaut-backup.timer
   DESTINATION /lib/systemd/system)
 install(FILES ${PROJECT_SOURCE_DIR}/README.md ${PROJECT_SOURCE_DIR}/CHANGELOG.md ${PROJECT_SOURCE_DIR}/SECURITY.md
-  ${package_files}/sbom.cdx.json DESTINATION share/doc/rheonaut)
-install(FILES ${PROJECT_SOURCE_DIR}/LICENSE DESTINATION share/doc/rheonaut RENAME copyright)
+  ${package_files}/sbom.cdx.json ${package_files}/copyright DESTINATION share/doc/rheonaut)
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/docs/ DESTINATION share/doc/rheonaut/docs FILES_MATCHING PATTERN "*.md" PATTERN "*.svg"
   PATTERN decisions EXCLUDE PATTERN images EXCLUDE)
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/deploy/proxy ${PROJECT_SOURCE_DIR}/deploy/prometheus
   ${PROJECT_SOURCE_DIR}/deploy/grafana DESTINATION share/doc/rheonaut/deploy)
-install(FILES ${PROJECT_SOURCE_DIR}/web/node_modules/@fontsource/b612/LICENSE DESTINATION share/doc/rheonaut
-  RENAME copyright.b612)  # the page's font
 install(PROGRAMS ${debian}/backup-daily DESTINATION libexec/rheonaut)
 
 set(CPACK_GENERATOR DEB)

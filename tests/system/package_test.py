@@ -3,6 +3,7 @@
 One story in order: installed on a bare system, the demo, the service under systemd with its watchdog, an upgrade that
 migrates, removed, purged. Without root or debootstrap it is skipped (exit status 77).
 """
+import json
 import os
 import pathlib
 import re
@@ -85,6 +86,7 @@ class PackageTest(unittest.TestCase):
         for page in ("rheonaut", "rheonaut-serve", "rheonaut-stop", "rheonaut-sim"):
             self.assertTrue(self.path(f"/usr/share/man/man1/{page}.1.gz").exists(), page)
         self.assertIn("_rheonaut", self.path("/usr/share/bash-completion/completions/rheonaut").read_text())
+        self.assertIn("preact", self.path("/usr/share/doc/rheonaut/copyright").read_text())
         # HDF5, and what it pulls, is loaded by the program that writes export files alone.
         self.assertNotIn("hdf5", self.tree.run("ldd", "/usr/bin/rheonaut").stdout)
         self.assertIn("hdf5", self.tree.run("ldd", "/usr/libexec/rheonaut/rheonaut-export").stdout)
@@ -142,6 +144,20 @@ class PackageTest(unittest.TestCase):
             return {os.sched_getscheduler(int(task.name)) & ~0x40000000  # SCHED_RESET_ON_FORK
                     for task in pathlib.Path(f"/proc/{pid}/task").iterdir()}
         self.tree.wait(lambda: os.SCHED_RR in policies(), "real-time priority")
+
+    def test_5c_exports_are_written_under_the_rights_of_the_unit(self):
+        with subprocess.Popen(["nsenter", "-t", self.tree.init, "-n", str(BUILD / "bin/rheonaut-sim"), "--id", "sim-1",
+                               "--station", "127.0.0.1:7070"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as robot:
+            try:
+                self.tree.wait(lambda: any(robot["id"] == "sim-1" for robot in self.asked("GET", "robots")["robots"]), "the robot")
+                run = self.asked("POST", "runs", {"robot_id": "sim-1", "name": "exported"})["run_id"]
+                self.tree.wait(lambda: self.asked("GET", f"runs/{run}")["samples_stored"] > 100, "samples")
+                self.asked("POST", f"runs/{run}/end", {})
+            finally:
+                robot.terminate()
+        # HDF5's program, in the unit's namespaces, with its temporary files in the data folder or the unit's /tmp.
+        for kind, first in (("mat", "MATLAB"), ("sqlite", "SQLite"), ("mcap", "\\x89MCAP")):
+            self.assertIn(first, self.asked("GET", f"runs/{run}/samples.{kind}", first_bytes=20))
 
     def test_6_a_station_that_stands_still_is_started_again(self):
         pid = self.tree.main_pid("rheonaut.service")
@@ -206,6 +222,19 @@ class PackageTest(unittest.TestCase):
 
     def is_active(self):
         return self.tree.inside("systemctl", "is-active", "rheonaut.service", check=False).stdout.strip() == "active"
+
+    def asked(self, method, path, body=None, first_bytes=None):
+        """What the API of the service answers: JSON, or the first bytes of a file as Python writes them."""
+        token = self.path("/var/lib/rheonaut/rheonaut.token").read_text().strip()
+        ask = ("import json, sys, urllib.request as u\n"
+               "method, path, body, token = sys.argv[1:]\n"
+               "headers = {'Authorization': 'Bearer ' + token, 'Content-Type': 'application/json'}\n"
+               "asked = u.Request('http://127.0.0.1:8080/api/v1/' + path, body.encode() or None, headers, method=method)\n"
+               f"answer = u.urlopen(asked, timeout=60).read({first_bytes or ''})\n"
+               f"print({'answer' if first_bytes else 'answer.decode()'})")
+        said = self.tree.in_its_network("/usr/bin/python3", "-c", ask, method, path, json.dumps(body) if body is not None else "",
+                                        token).stdout
+        return said if first_bytes else json.loads(said)
 
     def page_answers(self):
         ask = "import urllib.request as u; print(u.urlopen('http://127.0.0.1:8080/', timeout=60).read().decode())"
