@@ -58,7 +58,7 @@ def of_rheonaut(options):
         ask("POST", f"/runs/{run}/end", {})
         generator.terminate()
         generator.wait()
-        paths = {"csv": f"/runs/{run}/export?format=csv", "overview": f"/runs/{run}/overview?points=2000&channels=position_m"}
+        paths = {"csv": f"/runs/{run}/samples.csv", "overview": f"/runs/{run}/overview?points=2000&channels=position_m"}
         return {what: [timed(path) for _ in range(options.rounds)] for what, path in paths.items()}
 
 

@@ -67,8 +67,8 @@ def record(kind, options, robots):
         station.stop()
         stored, at_least, rows, size = station.stored()
     made = max(made, at_least)
-    return {"cpu_us": 1e6 * used_s / (robots * RATE_HZ * elapsed_s), "memory_mb": memory_mb, "stops_ms": stops, "missed_stops": missed,
-            "made": made, "lost": made - stored, "rows": rows, "size": size}
+    return {"cpu_us": 1e6 * used_s / (robots * RATE_HZ * elapsed_s), "memory_mb": memory_mb, "stops_ms": stops,
+            "missed_stops": missed, "made": made, "lost": made - stored, "rows": rows, "size": size}
 
 
 def kill(kind, options, what, robots=10):

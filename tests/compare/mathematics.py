@@ -16,7 +16,8 @@ FIRST_ORDER = {"gain": 0.08, "time_constant_s": 0.35}
 
 def timed(command):
     begun = time.perf_counter()
-    done = subprocess.run([str(part) for part in command], capture_output=True, text=True, env=environment(), timeout=300, check=False)
+    done = subprocess.run([str(part) for part in command], capture_output=True, text=True, env=environment(), timeout=300,
+                          check=False)
     if done.returncode:
         raise RuntimeError(f"{command}: {done.stderr}")
     return done.stdout, time.perf_counter() - begun

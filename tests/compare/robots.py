@@ -158,7 +158,8 @@ class MqttRobot(Robot):
 def main():
     kind, port, count, prefix = sys.argv[1], int(sys.argv[2]), int(sys.argv[3]), sys.argv[4]
     begun = time.monotonic()
-    robots = [(TcpRobot if kind == "tcp" else MqttRobot)(f"{prefix}-{i + 1}", begun + 0.5 + FRAME_S * i / count) for i in range(count)]
+    make = TcpRobot if kind == "tcp" else MqttRobot
+    robots = [make(f"{prefix}-{i + 1}", begun + 0.5 + FRAME_S * i / count) for i in range(count)]
     selector = selectors.DefaultSelector()
     selector.register(sys.stdin, selectors.EVENT_READ)
     ending_at, announced = None, False

@@ -24,7 +24,8 @@ PYTHON = "/usr/bin/python3" if pathlib.Path("/usr/bin/python3").exists() else sh
 def environment():
     """With what `deploy/compare --install` has unpacked, before what is installed."""
     unpacked = CACHE / "root" / "usr"
-    libraries = [str(path) for pattern in ("lib/*-linux-gnu/openblas-pthread", "lib/*-linux-gnu") for path in unpacked.glob(pattern)]
+    libraries = [str(path) for pattern in ("lib/*-linux-gnu/openblas-pthread", "lib/*-linux-gnu")
+                 for path in unpacked.glob(pattern)]
     joined = lambda name, paths: ":".join([*paths, *filter(None, [os.environ.get(name)])])  # noqa: E731
     return os.environ | {"LD_LIBRARY_PATH": joined("LD_LIBRARY_PATH", libraries), "COMPARE_NODE_MODULES": str(CACHE / "node"),
                          "PYTHONPATH": joined("PYTHONPATH", [str(unpacked / "lib/python3/dist-packages")]),
@@ -138,7 +139,7 @@ class Station:
     rows_sql = "SELECT count(*) FROM sample"
 
     def stored(self):
-        """Once everything has ended: (samples of the load that are stored, that were made at least, rows, bytes of the file)."""
+        """Once everything has ended: (samples of the load: stored, made at least; rows, bytes of the file)."""
         with contextlib.closing(sqlite3.connect(self.database)) as database:
             database.execute("PRAGMA wal_checkpoint(TRUNCATE)")
             robots = database.execute(self.robots_sql).fetchall()
@@ -206,11 +207,10 @@ class Node(Station):
 
     @staticmethod
     def version(_options):
-        return output("node", "-e", "const {createRequire} = require('module');"
-                      "const D = createRequire(process.env.COMPARE_NODE_MODULES + '/')('better-sqlite3');"
-                      "console.log(`Node ${process.versions.node}, better-sqlite3 ` + createRequire(process.env.COMPARE_NODE_MODULES"
-                      " + '/')('better-sqlite3/package.json').version + `, SQLite `"
-                      " + new D(':memory:').prepare('select sqlite_version()').pluck().get())")
+        return output("node", "-e", "const load = require('module').createRequire(process.env.COMPARE_NODE_MODULES + '/');"
+                      "const Database = load('better-sqlite3'), {version} = load('better-sqlite3/package.json');"
+                      "const sqlite = new Database(':memory:').prepare('select sqlite_version()').pluck().get();"
+                      "console.log(`Node ${process.versions.node}, better-sqlite3 ${version}, SQLite ${sqlite}`)")
 
     def start(self):
         self.spawn("the server", ["node", HERE / "node_server.mjs", self.database, self.robots_port, self.http_port])
