@@ -39,7 +39,7 @@ server/storage/query server/storage/export server/storage/export/mat server/stor
 server/analysis/metrics server/analysis/comparison server/analysis/report server/analysis/capsule server/analysis server/analysis/tuning
 server/analysis/documents server/experiments server/experiments/adaptive server/experiments/runner server/identity server/http
 server/api/bodies server/api/routes server/api/analysis server/api/experiments server/api server/cli/terminal server/cli/design
-server/cli/accounts server/cli/robots server/cli/analysis server/cli/data server/cli/experiments server/cli/health server/cli server/exporter
+server/cli/accounts server/cli/robots server/cli/analysis server/cli/data server/cli/experiments server/cli/commission server/cli/health server/cli server/exporter
 """.split()
 ROOMS_WITH_CONTROL = {"server/" + room for room in "analysis analysis/metrics analysis/tuning experiments experiments/adaptive experiments/runner cli/design".split()}
 # What decides only about the order of work, and the files of server/ that know it ("Threads of the station").

@@ -42,13 +42,15 @@ void add_options(CLI::App& command, CheckConfig& line) {
   command.footer("Example: rheonaut check-config --data ~/lab");
 }
 
-// A command whose options fill a T, which becomes the line.
+// A command whose options fill a T, which becomes the line, unless a command of its own has done so.
 template <class T>
 void offer(CLI::App& app, const char* name, const char* purpose, CommandLine& line) {
   auto parsed = std::make_shared<T>();
   CLI::App* command = app.add_subcommand(name, purpose);
   add_options(*command, *parsed);
-  command->callback([parsed, &line] { line = *parsed; });
+  command->callback([parsed, &line] {
+    if (std::holds_alternative<Answered>(line)) line = *parsed;
+  });
 }
 
 // The headings of --help, in its order, and their commands.
@@ -64,8 +66,8 @@ const std::vector<std::pair<const char*, std::vector<std::string_view>>> kGroups
     {"Accounts", {"user", "token"}},
     {"This program", {"completion", "man"}}};
 
-const std::set<std::string_view> kFileOptions{"config", "csv", "duty-csv", "motor-csv",
-                                              "file",   "to",  "plant",    "controller"};
+const std::set<std::string_view> kFileOptions{"answers", "config", "csv",   "duty-csv",  "motor-csv",
+                                              "file",    "to",     "plant", "controller"};
 
 void group(CLI::App& app) {
   for (const auto& [heading, names] : kGroups) {
@@ -122,6 +124,8 @@ void define_command_line(CLI::App& app, CommandLine& line) {
   offer<UserCommand>(app, "user", "Users of a station: add, list, change, remove", line);
   offer<TokenCommand>(app, "token", "API tokens of a station: create, list, revoke", line);
   offer<RobotCommand>(app, "robot", "Robots of a station: enroll, list, revoke", line);
+  offer<Commission>(*app.get_subcommand("robot"), "commission",
+                    "The first hour with a robot: prove its stops, measure it, write a signed record", line);
   offer<FluidCommand>(app, "fluid", "Fluids of a station and their models: list, model, remove-model", line);
   offer<JobCommand>(app, "job", "Computations of a station on its runs: begin, list, show, cancel", line);
   offer<DesignCommand>(app, "design", "Models and controllers that a station keeps: list, save, show, export, compare",

@@ -15,6 +15,7 @@
 #include "server/cli/analysis/impedance_map.hpp"
 #include "server/cli/analysis/metrics.hpp"
 #include "server/cli/analysis/report.hpp"
+#include "server/cli/commission/commission.hpp"
 #include "server/cli/data/backup.hpp"
 #include "server/cli/data/certificate.hpp"
 #include "server/cli/data/export.hpp"
@@ -56,12 +57,12 @@ struct Answered {
   int exit_code = 0;
 };
 
-using CommandLine =
-    std::variant<Answered, Serve, CheckConfig, Certificate, Backup, Restore, Verify, Export, Model, Bode, Step,
-                 Identify, EstimatorQuestion, Tune, Discretise, Predict, UserCommand, TokenCommand, RobotCommand,
-                 FluidCommand, JobCommand, DesignCommand, MetricsQuestion, CompareQuestion, ImpedanceMapQuestion,
-                 ReportQuestion, CapsuleQuestion, Reproduce, ReferenceCommand, ProfileQuestion, ExperimentCommand,
-                 Autotune, Demo, StopCommand, WatchCommand, Doctor, SupportBundle, CompletionCommand, ManualCommand>;
+using CommandLine = std::variant<Answered, Serve, CheckConfig, Certificate, Backup, Restore, Verify, Export, Model,
+                                 Bode, Step, Identify, EstimatorQuestion, Tune, Discretise, Predict, UserCommand,
+                                 TokenCommand, RobotCommand, FluidCommand, JobCommand, DesignCommand, MetricsQuestion,
+                                 CompareQuestion, ImpedanceMapQuestion, ReportQuestion, CapsuleQuestion, Reproduce,
+                                 ReferenceCommand, ProfileQuestion, ExperimentCommand, Autotune, Demo, StopCommand,
+                                 WatchCommand, Doctor, SupportBundle, Commission, CompletionCommand, ManualCommand>;
 
 // The program with all its commands; the one that is chosen when `app` parses becomes `line`.
 void define_command_line(CLI::App& app, CommandLine& line);

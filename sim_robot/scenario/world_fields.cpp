@@ -41,6 +41,7 @@ void fluid_fields(Fields& fields, PlantParameters& plant) {
 void motor_fields(Fields& fields, MotorParameters& motor) {
   fields.number("dead_zone_duty", motor.dead_zone_duty, {0, 1}, "below it the motor stands still");
   fields.number("time_constant_s", motor.time_constant_s, {0, 10}, "a lag beyond the 22 ms of the models");
+  fields.flag("is_reversed", motor.is_reversed, "its wires are swapped: a positive duty drives backwards");
   fields.must([&motor] { check(motor); });
 }
 
@@ -110,6 +111,8 @@ void accelerometer_fields(Fields& fields, std::optional<ImuParameters>& imu) {
   fields.number("drift_m_s3", imu->drift_m_s3, {0, 1}, "of the bias, either way");
   fields.number("clock_error", imu->clock_error, {0, 0.1}, "the largest, relative");
   fields.number("missed_read_probability", imu->missed_read_probability, {0, 1}, "of each read");
+  fields.number("axis_cosine", imu->axis_cosine, {-1, 1},
+                "of its axis to forwards: -1 turned round, 0 across the tube");
   fields.must([&imu] { check(*imu); });
 }
 

@@ -30,6 +30,7 @@ void check(const ImuParameters& p) {
   check_between("drift_m_s3", p.drift_m_s3, -1, 1);
   check_between("clock_error", p.clock_error, 0, 0.1);
   check_between("missed_read_probability", p.missed_read_probability, 0, 1);
+  check_between("axis_cosine", p.axis_cosine, -1, 1);
 }
 
 Imu::Imu(const ImuParameters& parameters, std::uint64_t seed)
@@ -37,7 +38,8 @@ Imu::Imu(const ImuParameters& parameters, std::uint64_t seed)
       noise_m_s2_(parameters.noise_m_s2_rthz * std::sqrt(parameters.bandwidth_hz)),
       wander_decay_(std::exp(-kTickS / parameters.wander_time_s)),
       wander_step_m_s2_(parameters.wander_m_s2 * std::sqrt(1 - wander_decay_ * wander_decay_)),
-      missed_read_probability_(parameters.missed_read_probability) {
+      missed_read_probability_(parameters.missed_read_probability),
+      axis_cosine_(parameters.axis_cosine) {
   check(parameters);
   const double turns = 2 * std::numbers::pi * parameters.bandwidth_hz * kTickS;
   filter_decay_ = std::exp(-turns);
@@ -59,9 +61,10 @@ Imu::Imu(const ImuParameters& parameters, std::uint64_t seed)
 void Imu::accelerate(double acceleration_m_s2, double mean_m_s2) {
   wander_m_s2_ = wander_decay_ * wander_m_s2_ + wander_step_m_s2_ * noise_.normal();  // (3)
   drift_m_s2_ += drift_m_s3_ * kTickS;
-  const double filtered_m_s2 = filter_decay_ * filtered_m_s2_ + (1 - filter_decay_) * acceleration_m_s2_ +
-                               filter_late_share_ * (acceleration_m_s2 - acceleration_m_s2_) +
-                               filter_bend_share_ * (mean_m_s2 - (acceleration_m_s2 + acceleration_m_s2_) / 2);  // (4)
+  const double driven_m_s2 = (1 - filter_decay_) * acceleration_m_s2_ +
+                             filter_late_share_ * (acceleration_m_s2 - acceleration_m_s2_) +
+                             filter_bend_share_ * (mean_m_s2 - (acceleration_m_s2 + acceleration_m_s2_) / 2);
+  const double filtered_m_s2 = filter_decay_ * filtered_m_s2_ + axis_cosine_ * driven_m_s2;  // (4), (5)
   while (until_sample_s_ <= kTickS) {
     counts_ = sample(std::lerp(filtered_m_s2_, filtered_m_s2, until_sample_s_ / kTickS));
     until_sample_s_ += sample_period_s_;

@@ -4,6 +4,7 @@
 //   bias = offset - mean of 2 s at rest + wander + drift · t                            (2)
 //   wander' = -wander/τ + white noise, sd σ                                             (3)
 //   f' = 2π B (a - f)                                                                   (4)   B: bandwidth
+//   a = acceleration along the tube · cosine of the angle of its axis                   (5)
 //
 // BNO055 data sheet: output unit 0.01 m/s², fusion at 100 Hz with a bandwidth of 62.5 Hz. Noise density 150 µg/√Hz over
 // that bandwidth (0.0116 m/s² a sample), offset ±20 mg, bias instability 0.05 mg with τ = 100 s and drift 10 µg/s are
@@ -32,6 +33,7 @@ struct ImuParameters {
   double drift_m_s3 = 0.000098;            // 10 µg/s
   double clock_error = 0.005;              // the largest, relative; [0, 0.1]
   double missed_read_probability = 0.001;  // of each read
+  double axis_cosine = 1;                  // of its axis to forwards: -1 the wrong way round, 0 across the tube
 };
 
 void check(const ImuParameters& parameters);
@@ -68,11 +70,12 @@ class Imu {
   double wander_decay_, wander_step_m_s2_;   // of (3), in a tick
   double filter_decay_, filter_late_share_;  // of (4): e^{-x} and 1 - (1 - e^{-x})/x, x = 2πB dt
   double filter_bend_share_;                 // and 6 (x - 2 + (x + 2) e^{-x})/x²
-  double missed_read_probability_;
+  double missed_read_probability_, axis_cosine_;
   double sample_period_s_, drift_m_s3_;
   double residual_m_s2_ = 0, wander_m_s2_ = 0, drift_m_s2_ = 0;
   double until_sample_s_;
-  double acceleration_m_s2_ = 0, filtered_m_s2_ = 0;  // a and f at the last tick
+  double acceleration_m_s2_ = 0;  // along the tube at the last tick
+  double filtered_m_s2_ = 0;      // f, then
   std::int16_t counts_ = 0;
   SensorFault fault_;
 };

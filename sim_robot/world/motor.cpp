@@ -19,15 +19,16 @@ void check(const MotorParameters& parameters) {
 
 Motor::Motor(const MotorParameters& parameters)
     : dead_zone_duty_(parameters.dead_zone_duty),
+      direction_(parameters.is_reversed ? -1 : 1),
       decay_(std::exp(-kTickS / parameters.time_constant_s)),
       mean_share_(parameters.time_constant_s / kTickS * (1 - decay_)) {
   check(parameters);
 }
 
 double Motor::step(double duty, double supply_ratio) {
-  const double wanted = driven(duty) * supply_ratio;            // (1)
-  const double mean = wanted + (rate_ - wanted) * mean_share_;  // (3)
-  rate_ = wanted + (rate_ - wanted) * decay_;                   // (2)
+  const double wanted = direction_ * driven(duty) * supply_ratio;  // (1)
+  const double mean = wanted + (rate_ - wanted) * mean_share_;     // (3)
+  rate_ = wanted + (rate_ - wanted) * decay_;                      // (2)
   return mean;
 }
 

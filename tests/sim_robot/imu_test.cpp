@@ -25,6 +25,17 @@ TEST(Imu, CountsHundredthsOfAMetrePerSecondSquared) {
   EXPECT_TRUE(imu.read().is_valid);
 }
 
+TEST(Imu, MeasuresTheShareThatLiesAlongItsAxis) {
+  for (const double cosine : {-1.0, 0.0, 0.5}) {
+    ImuParameters parameters = silent();
+    parameters.axis_cosine = cosine;
+    Imu imu{parameters, 1};
+    for (int k = 0; k < 10; ++k) imu.accelerate(2);
+    EXPECT_EQ(imu.read().counts, 200 * cosine);
+  }
+  EXPECT_THROW(check(ImuParameters{.axis_cosine = 1.5}), std::invalid_argument);
+}
+
 TEST(Imu, SaturatesInsteadOfWrapping) {
   Imu imu{silent(), 1};
   for (int k = 0; k < 3; ++k) imu.accelerate(1e6);

@@ -24,6 +24,14 @@ TEST(Motor, StandsStillBelowItsDeadZoneEitherWay) {
   EXPECT_EQ(motor.step(-0.03, 1), -0.03);
 }
 
+TEST(Motor, DrivesTheOtherWayWithItsWiresSwapped) {
+  Motor motor{{.dead_zone_duty = 0.03, .is_reversed = true}};
+  EXPECT_EQ(motor.step(0.3, 1), -0.3);
+  EXPECT_EQ(motor.step(-0.3, 1), 0.3);
+  EXPECT_EQ(motor.step(0.02, 1), 0);
+  EXPECT_EQ(motor.driven(0.3), 0.3) << "the battery feeds the same";
+}
+
 TEST(Motor, LagsByItsTimeConstantAndLosesNoTravel) {
   constexpr double kTimeConstantS = 0.05, kEndS = 2;
   Motor motor{{.time_constant_s = kTimeConstantS}};

@@ -27,7 +27,7 @@ inline constexpr ExitStatus kExitStatuses[] = {
     {5,
      "not confirmed, or it did not end well: stop: a robot has not confirmed; robot parameters, robot controller: "
      "accepted, but not reported back; job, experiment: failed, cancelled, aborted or interrupted; autotune: a stage "
-     "did not end well"},
+     "did not end well; robot commission: the record is not signed"},
 };
 
 // Options that do not go together, or a value that another option makes impossible: exit status 2.

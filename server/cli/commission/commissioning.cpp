@@ -1,0 +1,243 @@
+// Each step asks the person, performs, judges, and says what it found.
+#include "server/cli/commission/commissioning.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <stdexcept>
+
+#include "base/version.hpp"
+
+namespace server::cli {
+namespace {
+
+using nlohmann::json;
+
+constexpr long kSensorFault = 8;  // of a sample's flags
+constexpr double kUsPerMs = 1000;
+constexpr std::array kInOrder{"versions", "stop_latency", "imu_noise",      "electrode",  "motor_direction",
+                              "imu_axis", "dead_zone",    "motor_constant", "free_travel"};
+
+double value_of(const json& parameters, const char* name, double other) {
+  const json value = parameters.value(name, json());
+  return value.is_number() ? value.get<double>() : other;
+}
+
+std::string lost_text(const StopAnswer& stop) {
+  return stop.is_confirmed
+             ? fmt::format(
+                   "The robot is stopped: it confirmed after {:.1f} ms. It stays in emergency until somebody resets "
+                   "it.",
+                   stop.confirmed_ms)
+             : "THE STOP IS NOT CONFIRMED: " + stop.why + ". SWITCH THE ROBOT OFF BY HAND.";
+}
+
+}  // namespace
+
+void Commissioning::add(StepFinding finding) {
+  person_.tell(fmt::format("{:<9}  {}: {}", text(finding.verdict), finding.step, finding.found));
+  if (!finding.action.empty()) person_.tell("           to do: " + finding.action);
+  record_.findings.push_back(std::move(finding));
+}
+
+void Commissioning::look_at_robot() {
+  const json state = robot_.state(), station = robot_.station(), controller = robot_.controller();
+  const json latch = state.at("emergency_id");
+  if (state.at("link") != "connected" || state.at("sample").is_null()) {
+    throw std::runtime_error{fmt::format("the robot '{}' is not connected", record_.robot_id)};
+  }
+  if (!latch.is_null()) {
+    throw std::runtime_error{"the robot is in emergency: find out why, reset it on the page, and begin again"};
+  }
+  if (state.at("mode") != "manual" || state.at("sample").at("duty") != 0.0) {
+    throw std::runtime_error{"the robot is in use: bring it to rest in manual, and begin again"};
+  }
+  if (controller.is_null()) throw std::runtime_error{"the robot has not reported its controller yet; try again"};
+  parameters_ = robot_.parameters();
+  robot_.take_control();
+  travel_.duty_max = value_of(controller, "duty_max", 1);
+  plan_.is_one_way = value_of(controller, "duty_min", -1) >= 0;
+  travel_.limit_min_m = value_of(parameters_, "position_limit_min_m", travel_.limit_min_m);
+  travel_.limit_max_m = value_of(parameters_, "position_limit_max_m", travel_.limit_max_m);
+  const json status = state.at("status"), path = state.at("stop_path");
+  if (path.is_object() && path.at("round_trip_us").is_number()) {
+    stops_.round_trip_ms = path.at("round_trip_us").get<double>() / kUsPerMs;
+  }
+  record_.subject = {{"firmware_version", state.at("firmware_version")},
+                     {"station_version", station.at("version")},
+                     {"program_version", base::version()},
+                     {"store_id", station.at("store_id")},
+                     {"boot_id", state.at("boot_id")},
+                     {"peer", state.at("peer")},
+                     {"controller_id", state.at("controller_id")},
+                     {"controller_checksum", state.at("controller_checksum")},
+                     {"parameters_checksum", state.at("parameters_checksum")},
+                     {"fluid", state.at("fluid")},
+                     {"model", state.at("model").at("state")}};
+  VersionFacts versions{state.at("firmware_version").get<std::string>(), station.at("version").get<std::string>(),
+                        base::version(), state.at("reset_cause").get<std::string>()};
+  versions.has_status = status.is_object();
+  if (versions.has_status) versions.imu_calibration = status.at("imu_calibration").get<long>();
+  record_.plan = {
+      {"largest_duty", plan_.largest_duty},
+      {"one_way", plan_.is_one_way},
+      {"stops", kStops},
+      {"needed_m", needed_m(plan_)},
+      {"profiles", {rest_profile(), pushes_profile(plan_), direction_profile(plan_), steps_profile(plan_)}}};
+  for (const std::string& line : words_of(plan_)) person_.tell(line);
+  add(judge_versions(versions));
+}
+
+// SAFETY: before the motor runs, and whichever way it will go.
+void Commissioning::ask_for_room() {
+  travel_.ahead_m =
+      person_.length_m("free_ahead_m", "How far may it swim forwards from where it lies, by your ruler, in m?");
+  travel_.behind_m = person_.length_m("free_behind_m", "And backwards, in m?");
+  const double free_m = std::min(travel_.ahead_m, travel_.behind_m);
+  if (free_m >= needed_m(plan_)) return;
+  throw std::runtime_error{fmt::format(
+      "there are {:.2f} m of free way, and {:.2f} m are needed ahead and behind: put the robot into the middle, "
+      "or give less than --duty {:.2f}",
+      free_m, needed_m(plan_), plan_.largest_duty)};
+}
+
+void Commissioning::prove_stops() {
+  person_.confirm(fmt::format("Begin with {} emergency stops? The motor stays off.", kStops));
+  for (int i = 0; i < kStops; ++i) {
+    ++stops_.asked;
+    const StopAnswer stop = robot_.stop();
+    if (!stop.is_confirmed) {
+      stops_.not_confirmed = fmt::format("stop {} is not: {}", stops_.asked, stop.why);
+      add(judge_stops(stops_));
+      throw std::runtime_error{"a stop was not confirmed, so the motor must not run"};
+    }
+    stops_.confirmed_ms.push_back(stop.confirmed_ms);
+    robot_.reset(stop.emergency_id);
+  }
+  add(judge_stops(stops_));
+  travel_.worst_stop_ms = worst_stop_ms(stops_);
+}
+
+RecordedRun Commissioning::record_run(const json& profile) {
+  RecordedRun run = robot_.perform(profile);
+  record_.runs.push_back(run.reference);
+  return run;
+}
+
+void Commissioning::measure_at_rest() {
+  person_.confirm("Does it lie still in its fluid, the pump off, and nobody touches it?");
+  const RecordedRun run = record_run(rest_profile());
+  for (const RecordedSample& sample : run.samples) {
+    rest_.acceleration_m_s2.push_back(sample.acceleration_m_s2);
+    rest_.impedance_mv.push_back(sample.impedance_mv);
+    rest_.has_sensor_fault = rest_.has_sensor_fault || (sample.flags & kSensorFault) != 0;
+  }
+  rest_.expected_noise_m_s2 = value_of(parameters_, "acceleration_noise_m_s2", rest_.expected_noise_m_s2);
+  rest_.nominal_mv = value_of(parameters_, "impedance_nominal_mv", rest_.nominal_mv);
+  rest_.band_mv = value_of(parameters_, "impedance_band_mv", rest_.band_mv);
+  add(judge_imu_noise(rest_));
+  add(judge_electrode(rest_));
+}
+
+void Commissioning::push() {
+  const json profile = pushes_profile(plan_);
+  person_.confirm(
+      fmt::format("THE MOTOR RUNS NOW for the first time: pushes of duty {:.2f} to {:.2f}, {:.0f} s. Is the way "
+                  "free?",
+                  smallest_duty(plan_), plan_.largest_duty, duration_of(profile)));
+  dead_zone_.is_one_way = plan_.is_one_way;
+  dead_zone_.parameter = value_of(parameters_, "dead_zone_duty", 0);
+  dead_zone_.responses = responses_of(record_run(profile).samples, sd_of(rest_.acceleration_m_s2));
+  if (plan_.is_one_way) dead_zone_.has_refused_backwards = robot_.refuses_duty(-smallest_duty(plan_));
+}
+
+void Commissioning::find_direction() {
+  person_.confirm(fmt::format("Watch it: one push of duty {:+.2f} for 1 s. Is the way free?", direction_duty(plan_)));
+  const RecordedRun run = record_run(direction_profile(plan_));
+  const std::string word = person_.word("direction", "Which way did it move?", kDirections);
+  direction_.person = word == "forwards"    ? SeenByPerson::forwards
+                      : word == "backwards" ? SeenByPerson::backwards
+                                            : SeenByPerson::nothing;
+  direction_.response.duty = direction_duty(plan_);
+  for (const Response& one : responses_of(run.samples, sd_of(rest_.acceleration_m_s2))) {
+    if (one.duty > 0) direction_.response = one;
+  }
+  if (direction_.response.edges == 0) throw std::runtime_error{"samples of the push are missing: see to the link"};
+  travel_.believed_m = run.samples.back().position_m;
+  travel_.believed_sd_m = run.samples.back().position_sd_m;
+  travel_.measured_m = person_.maybe_length_m(
+      "moved_m", "How far did it move in all, by your ruler, in m, forwards positive? (Enter: not measured)");
+  add(judge_motor_direction(direction_));
+  add(judge_imu_axis(direction_));
+}
+
+void Commissioning::judge_pushes() {
+  if (direction_.person != SeenByPerson::nothing && !direction_.response.is_seen()) {
+    return add(not_done("dead_zone", "the accelerometer sees no motion: its axis comes first"));
+  }
+  add(judge_dead_zone(dead_zone_));
+}
+
+void Commissioning::find_motor_constant() {
+  const auto is_fail = [](const StepFinding& one) {
+    return one.verdict != Verdict::pass && (one.step == "motor_direction" || one.step == "imu_axis");
+  };
+  if (std::ranges::any_of(record_.findings, is_fail)) {
+    return add(
+        not_done("motor_constant", "it means nothing before the motor's direction and the sensor's axis are right"));
+  }
+  person_.confirm(fmt::format("The last motion: four steps of duty {:.2f} for 1 s, {}. Is the way free?",
+                              plan_.largest_duty, plan_.is_one_way ? "forwards" : "there and back"));
+  const RecordedRun run = record_run(steps_profile(plan_));
+  person_.tell("The station fits a model to the step ...");
+  motor_.fit = robot_.fit(run.run_id, motor_.failure);
+  add(judge_motor_constant(motor_));
+}
+
+void Commissioning::judge_travel() {
+  travel_.gain_m_s = gain_of(motor_);
+  add(judge_free_travel(travel_));
+}
+
+void Commissioning::complete() {
+  for (const char* step : kInOrder) {
+    const auto is_it = [step](const StepFinding& one) { return one.step == step; };
+    if (std::ranges::none_of(record_.findings, is_it)) record_.findings.push_back(not_done(step, "not reached"));
+  }
+}
+
+// SAFETY: whatever it was, the robot is stopped first.
+void Commissioning::end_early(const std::string& why) {
+  const StopAnswer stop = robot_.stop_and_end();
+  record_.ended_by = why + (stop.is_confirmed ? "; the robot confirmed its stop" : "; THE STOP WAS NOT CONFIRMED");
+  person_.tell("\nEnded: " + why + "\n" + lost_text(stop));
+}
+
+void Commissioning::perform() {
+  prove_stops();
+  measure_at_rest();
+  push();
+  find_direction();
+  judge_pushes();
+  find_motor_constant();
+  judge_travel();
+}
+
+void Commissioning::run() {
+  look_at_robot();
+  ask_for_room();
+  try {
+    perform();
+  } catch (const Interrupted&) {
+    end_early("interrupted by a signal");
+  } catch (const Declined&) {
+    end_early("the person did not go on");
+  } catch (const std::exception& error) {
+    end_early(error.what());
+  }
+  complete();
+  robot_.release_control();
+}
+
+}  // namespace server::cli

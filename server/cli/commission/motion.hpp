@@ -1,0 +1,80 @@
+// What is found while the motor runs: how the accelerometer answers a duty, the motor's direction, the sensor's axis,
+// the dead zone, the motor constant, the free travel. Facts in, a finding out: nothing here asks a robot.
+//
+// An edge is a change of the duty between 0 and u. The sum of the acceleration over the window that follows is the
+// change of the velocity that the sensor saw; after an edge to 0 its sign is turned round. The mean over the edges of
+// one duty is
+//   response = mean ± noise · dt · √(window/dt) / √(number of edges)          noise: sd of a reading at rest
+// A slow drift of the bias cancels between the two edges of a push.
+// The motor's direction and the sensor's axis turn the response round alike, so the response alone tells neither: the
+// word of the person who watches the robot separates them.
+// Errors: none.
+#pragma once
+
+#include <cstdint>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "server/cli/commission/finding.hpp"
+
+namespace server::cli {
+
+struct RecordedSample {
+  std::int64_t robot_time_us = 0;
+  double position_m = 0, position_sd_m = 0;  // the robot's own estimate
+  double acceleration_m_s2 = 0;
+  double duty = 0;
+  double impedance_mv = 0;
+  long flags = 0;
+};
+
+// How the accelerometer answers one duty.
+struct Response {
+  double duty = 0;
+  double velocity_m_s = 0, sd_m_s = 0;
+  std::size_t edges = 0;
+  bool is_seen() const;  // beyond the noise
+};
+
+inline constexpr double kResponseWindowS = 0.25;
+
+// Of each duty that a push had, ascending. An edge whose window has a gap or another edge in it does not count.
+std::vector<Response> responses_of(const std::vector<RecordedSample>& samples, double noise_m_s2);
+
+enum class SeenByPerson : std::uint8_t { forwards, backwards, nothing };
+
+struct DirectionFacts {
+  Response response;  // to a duty above 0
+  SeenByPerson person = SeenByPerson::nothing;
+};
+StepFinding judge_motor_direction(const DirectionFacts& facts);
+StepFinding judge_imu_axis(const DirectionFacts& facts);
+
+struct DeadZoneFacts {
+  std::vector<Response> responses;
+  bool is_one_way = false;             // the motor runs forwards alone
+  bool has_refused_backwards = false;  // and the robot refused a duty below 0
+  double parameter = 0;                // dead_zone_duty of the robot
+};
+StepFinding judge_dead_zone(const DeadZoneFacts& facts);
+
+struct MotorFacts {
+  nlohmann::json fit;   // the result of the job `identify` with second_order; null: it failed
+  std::string failure;  // why
+};
+StepFinding judge_motor_constant(const MotorFacts& facts);
+std::optional<double> gain_of(const MotorFacts& facts);  // m/s per duty
+
+struct TravelFacts {
+  double ahead_m = 0, behind_m = 0;              // free, by the person's ruler, from where the robot lay
+  double limit_min_m = -100, limit_max_m = 100;  // the robot's parameters
+  double believed_m = 0, believed_sd_m = 0;      // after the push that the person watched
+  std::optional<double> measured_m{};            // the same by the ruler
+  std::optional<double> gain_m_s{};              // per duty
+  double duty_max = 1, worst_stop_ms = 0;
+};
+StepFinding judge_free_travel(const TravelFacts& facts);
+
+}  // namespace server::cli

@@ -1,0 +1,221 @@
+// Requests with an end, one after the other.
+#include "server/cli/commission/robot_access.hpp"
+
+#include <fmt/format.h>
+
+#include <boost/asio/io_context.hpp>
+#include <stdexcept>
+
+#include "server/cli/commission/plan.hpp"
+#include "server/cli/experiments/station_work.hpp"
+#include "server/runtime/clock.hpp"
+
+namespace server::cli {
+namespace {
+
+using nlohmann::json;
+
+constexpr microseconds kPatience{8'000'000};      // of a request; a verified command takes 5 s at most
+constexpr microseconds kStopPatience{7'000'000};  // SAFETY: as of `rheonaut stop`
+constexpr std::chrono::milliseconds kLook{20};
+constexpr std::int64_t kReleasePatienceUs = 2'000'000;
+constexpr std::int64_t kLatchedWithinUs = 5'000'000, kBeginsWithinUs = 20'000'000, kEndsLateUs = 30'000'000;
+constexpr std::int64_t kDigestWithinUs = 10'000'000, kFitWithinUs = 120'000'000;
+constexpr int kFitTimeLimitS = 60, kControlMs = 600'000, kPage = 1000;
+constexpr double kUsOfS = 1e6;
+
+// The end of a wait.
+class Deadline {
+ public:
+  explicit Deadline(std::int64_t within_us) : ends_us_{clock_.steady_us() + within_us} {}
+  bool is_over() const { return clock_.steady_us() > ends_us_; }
+
+ private:
+  boost::asio::io_context loop_;
+  runtime::SystemClock clock_{loop_};
+  std::int64_t ends_us_;
+};
+
+double number_or_0(const json& value) { return value.is_number() ? value.get<double>() : 0; }
+
+RecordedSample sample_in(const json& row) {
+  return {row.at("robot_time_us").get<std::int64_t>(),
+          number_or_0(row.at("position_m")),
+          number_or_0(row.at("position_sd_m")),
+          number_or_0(row.at("acceleration_m_s2")),
+          number_or_0(row.at("duty")),
+          number_or_0(row.at("impedance_mv")),
+          row.at("flags").get<long>()};
+}
+
+std::string text_or(const json& object, const char* name, const char* other) {
+  const json value = object.value(name, json());
+  return value.is_string() ? value.get<std::string>() : other;
+}
+
+}  // namespace
+
+RobotAccess::RobotAccess(const std::filesystem::path& data_dir, std::string robot_id, Interruption& interruption)
+    : client_{data_dir},
+      path_{"/api/v1/robots/" + robot_id},
+      robot_id_{std::move(robot_id)},
+      interruption_{interruption} {}
+
+StationAnswer RobotAccess::ask(const std::string& method, const std::string& target, const json& body) const {
+  interruption_.throw_if_come();
+  StationAnswer answer = client_.ask_at_once({{method, target, body}}, kPatience).front();
+  interruption_.throw_if_come();
+  if (answer.status == 0) throw std::runtime_error{answer.text};
+  return answer;
+}
+
+json RobotAccess::parameters() const {
+  json by_name = json::object();
+  const json known = get(path_ + "/parameters").at("parameters");
+  if (known.is_null()) throw std::runtime_error{"the robot has not reported its parameters yet; try again"};
+  for (const json& one : known) by_name[one.at("name").get<std::string>()] = one.at("value");
+  return by_name;
+}
+
+void RobotAccess::take_control() const { post(path_ + "/control", {{"action", "take"}, {"lease_ms", kControlMs}}); }
+
+void RobotAccess::release_control() const {
+  client_.ask_at_once({{"POST", path_ + "/control", {{"action", "release"}}}}, microseconds{kReleasePatienceUs});
+}
+
+StopAnswer RobotAccess::stop() const {
+  const StationAnswer answer = client_.ask_at_once({{"POST", path_ + "/emergency-stop"}}, kStopPatience).front();
+  const json record = answer.body.is_object() ? answer.body : json::object();
+  const std::string state = text_or(record, "state", "");
+  StopAnswer outcome;
+  // SAFETY: only what the robot itself has acknowledged counts as a stop; sent or queued is not enough.
+  outcome.is_confirmed = state == "acknowledged" || state == "verified";
+  outcome.confirmed_ms = number_or_0(record.value("acknowledged_after_us", json())) / 1e3;
+  outcome.emergency_id = text_or(record, "emergency_id", "");
+  if (!outcome.is_confirmed) {
+    outcome.why = answer.status == 0 ? answer.text
+                  : state.empty()    ? "the station refused: " + text_or(record, "detail", "no reason")
+                                     : "the robot has not answered; the stop is kept and repeated";
+  }
+  return outcome;
+}
+
+void RobotAccess::reset(const std::string& emergency_id) const {
+  const Deadline latched{kLatchedWithinUs};
+  for (;;) {
+    const json now = state();
+    const json duty = now.at("sample").is_null() ? json() : now.at("sample").at("duty");
+    if (now.at("mode") == "emergency" && duty == 0.0) break;
+    if (latched.is_over()) throw std::runtime_error{"the robot confirmed a stop and does not show it in its telemetry"};
+    interruption_.wait(kLook);
+  }
+  const json record =
+      post(path_ + "/commands?wait=verified", {{"kind", "clear_emergency"}, {"emergency_id", emergency_id}});
+  if (record.at("state") != "verified") {
+    throw std::runtime_error{fmt::format("the emergency was not reset: {} ({})", text_or(record, "state", "?"),
+                                         text_or(record, "reason", ""))};
+  }
+}
+
+StopAnswer RobotAccess::stop_and_end() {
+  StopAnswer outcome = stop();
+  if (open_experiment_) {
+    const std::string target = fmt::format("/api/v1/experiments/{}/abort", *open_experiment_);
+    client_.ask_at_once({{"POST", target, {{"reason", "the commissioning has ended"}}}}, kPatience);
+  }
+  return outcome;
+}
+
+RecordedRun RobotAccess::perform(const json& profile) {
+  take_control();  // for as long as somebody may think between two steps
+  const auto ask_station = [this](const std::string& method, const std::string& target, const json& body) {
+    return ask(method, target, body);
+  };
+  const Deadline begins{kBeginsWithinUs};
+  const Deadline ends{kBeginsWithinUs + kEndsLateUs + static_cast<std::int64_t>(kUsOfS * duration_of(profile))};
+  // SAFETY: a wait for something that does not come ends, and with it the signs of life.
+  const StationWork work{ask_station, [&](const json& experiment) {
+                           if (experiment.at("state") == "waiting" && begins.is_over()) {
+                             throw std::runtime_error{fmt::format("the experiment does not begin: {} {}",
+                                                                  text_or(experiment, "waits_for", ""),
+                                                                  text_or(experiment, "waits_for_detail", ""))};
+                           }
+                           if (experiment.at("state") == "paused") {
+                             throw std::runtime_error{fmt::format("the experiment is paused: {}",
+                                                                  text_or(experiment, "detail", "no reason"))};
+                           }
+                           if (ends.is_over()) throw std::runtime_error{"the experiment does not end"};
+                         }};
+  const json begun = work.post("/api/v1/experiments", {{"robot_id", robot_id_}, {"profile", profile}});
+  open_experiment_ = begun.at("experiment_id").get<std::int64_t>();
+  const json ended = work.finished_experiment(*open_experiment_);
+  open_experiment_.reset();
+  if (ended.at("state") != "done") {
+    throw std::runtime_error{fmt::format("the experiment was {}: {} {}", text_or(ended, "state", "?"),
+                                         text_or(ended, "reason", ""), text_or(ended, "detail", ""))};
+  }
+  RecordedRun run;
+  run.run_id = ended.at("runs").front().at("run_id").get<std::int64_t>();
+  run.samples = samples_of(run.run_id);
+  run.reference = reference_of(run.run_id, text_or(profile, "name", ""));
+  return run;
+}
+
+std::vector<RecordedSample> RobotAccess::samples_of(std::int64_t run_id) const {
+  std::vector<RecordedSample> samples;
+  std::string after;
+  do {
+    const json page = get(fmt::format("/api/v1/runs/{}/samples?limit={}{}", run_id, kPage, after));
+    for (const json& row : page.at("samples")) samples.push_back(sample_in(row));
+    after = page.at("next").is_string() ? "&after=" + page.at("next").get<std::string>() : "";
+  } while (!after.empty());
+  return samples;
+}
+
+nlohmann::ordered_json RobotAccess::reference_of(std::int64_t run_id, const std::string& purpose) const {
+  const std::string target = fmt::format("/api/v1/runs/{}/certificate", run_id);
+  const Deadline deadline{kDigestWithinUs};
+  json digest = get(target);
+  while (digest.at("final") != true && !deadline.is_over()) {
+    interruption_.wait(kLook);
+    digest = get(target);
+  }
+  return {{"run_id", run_id},
+          {"purpose", purpose},
+          {"samples_expected", digest.value("samples_expected", json())},
+          {"samples_lost", digest.value("samples_lost", json())},
+          {"sha256", digest.value("sha256", json())}};
+}
+
+bool RobotAccess::refuses_duty(double duty) const {
+  const json body{{"kind", "set_duty"}, {"duty", duty}, {"lease_ms", 1}};
+  const StationAnswer answer = ask("POST", path_ + "/commands", body);
+  constexpr int kFirstRefusal = 400, kFirstFailure = 500;
+  return answer.status >= kFirstRefusal && answer.status < kFirstFailure;
+}
+
+json RobotAccess::fit(std::int64_t run_id, std::string& failure) const {
+  const json body{{"kind", "identify"},
+                  {"run_id", run_id},
+                  {"structure", "second_order"},
+                  {"cut_at_gaps", true},
+                  {"time_limit_s", kFitTimeLimitS}};
+  const auto id = post("/api/v1/jobs", body).at("job_id").get<std::int64_t>();
+  const Deadline deadline{kFitWithinUs};
+  for (;;) {
+    const json job = get(fmt::format("/api/v1/jobs/{}?wait_ms=500", id));
+    if (job.at("state") == "done") return job.at("result");
+    if (!job.at("ended_at_us").is_null()) failure = text_or(job, "error", "the computation did not end well");
+    if (job.at("ended_at_us").is_null() && deadline.is_over()) failure = "the computation took longer than 2 minutes";
+    if (!failure.empty()) return nullptr;
+  }
+}
+
+std::string RobotAccess::mark(const std::string& line) const {
+  const StationAnswer answer = client_.ask_at_once({{"POST", path_ + "/markers", {{"text", line}}}}, kPatience).front();
+  constexpr int kFirstProblem = 300;
+  if (answer.status != 0 && answer.status < kFirstProblem) return {};
+  return answer.status == 0 ? answer.text : text_or(answer.body, "detail", "refused");
+}
+
+}  // namespace server::cli
