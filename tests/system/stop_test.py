@@ -97,7 +97,7 @@ class StopTest(unittest.TestCase):
                 for words in (("sim-1",), ("--all",)):
                     hung = self.stop(place, *words)
                     self.assertEqual((hung.returncode, hung.stdout), (1, ""))
-                    self.assertRegex(hung.stderr, r"^rheonaut: .*has not answered within 7000 ms; IT IS NOT KNOWN")
+                    self.assertRegex(hung.stderr, r"^rheonaut: .*has not answered within 7 s; IT IS NOT KNOWN")
             finally:
                 place.station_process.send_signal(signal.SIGCONT)
             # The request had arrived: the robot is stopped once the station runs again.
