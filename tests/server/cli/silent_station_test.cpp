@@ -42,7 +42,8 @@ class SilentStation {
     std::string request;
     asio::read_until(socket_, asio::dynamic_buffer(request), "\r\n\r\n");
     for (const std::string& piece : pieces_) {
-      asio::write(socket_, asio::buffer(piece));
+      boost::system::error_code gone;  // the tool may have left
+      asio::write(socket_, asio::buffer(piece), gone);
       std::this_thread::sleep_for(pause_);
     }
   }
