@@ -191,7 +191,8 @@ std::optional<int> answer(const CommandLine& line, std::ostream& out) {
           std::ostringstream text;
           int exit_code = 0;
           try {
-            exit_code = run(options, text);
+            // SAFETY: a stop prints its outcome before it looks for reasons.
+            exit_code = run(options, std::is_same_v<T, StopCommand> ? out : text);
           } catch (const UsageError& error) {
             fmt::print(stderr, "rheonaut: {}\n", one_line(error.what()));
             return base::command_line::kUsageError;

@@ -69,7 +69,8 @@ void define_command_line(CLI::App& app, CommandLine& line);
 
 CommandLine parse_command_line(int argc, char** argv);
 
-// Does everything but to serve, and returns the exit code; none for Serve. Writes to `out` only what is complete.
+// Does everything but to serve, and returns the exit code; none for Serve. Writes to `out` only what is complete, but
+// for `stop`, which writes its outcome at once.
 // Options that do not go together are explained on standard error. Throws what the tools throw: a sentence for the
 // user.
 std::optional<int> answer(const CommandLine& line, std::ostream& out);

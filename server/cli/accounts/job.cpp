@@ -136,7 +136,8 @@ int begin(const JobCommand& options, std::ostream& out) {
 }
 
 int save_file(const JobCommand& options, std::ostream& out) {
-  StationClient{options.data_dir}.save(fmt::format("{}/{}/file", kJobs, options.job), options.to);
+  StationClient{options.data_dir}.save(fmt::format("{}/{}/file", kJobs, options.job), options.to,
+                                       timeout(options.timeout_s));
   fmt::print(out, "{}\n", options.to.string());
   return 0;
 }
@@ -172,6 +173,7 @@ void add_options(CLI::App& command, JobCommand& options) {
       offer(command, options, JobCommand::Act::file, "file", "Save the file that a report or export has made");
   offer_number(file, options);
   file->add_option("--to", options.to, "The file; one that is there is replaced")->required()->check(named());
+  add_timeout_option(*file, options.timeout_s);
   offer_number(offer(command, options, JobCommand::Act::cancel, "cancel", "End a job that waits or runs"), options);
   command.footer("Example: rheonaut job list --data lab");
 }

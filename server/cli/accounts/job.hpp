@@ -5,6 +5,8 @@
 #include <filesystem>
 #include <iosfwd>
 
+#include "server/cli/terminal/options.hpp"
+
 namespace CLI {
 class App;
 }
@@ -19,6 +21,7 @@ struct JobCommand {
   std::filesystem::path data_dir = "rheonaut-data";
   std::filesystem::path file;  // the request as JSON; "-": standard input
   std::filesystem::path to;    // where the job's file is saved
+  double timeout_s = kLongAnswer_s;
   std::int64_t job = 0;
   bool waits = false;
   bool json = false;

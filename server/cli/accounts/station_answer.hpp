@@ -2,6 +2,7 @@
 #pragma once
 
 #include <boost/asio/ip/tcp.hpp>
+#include <chrono>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -19,7 +20,19 @@ struct StationAnswer {
   nlohmann::json body;            // of an error: problem details; null of a page
   std::string text;               // of what is not JSON; without an answer, why
   bool may_have_arrived = false;  // of a request without an answer: the station may have got it and acted
+  bool is_silent = false;         // without an answer: because the time was over
 };
+
+// How long a tool waits for the station.
+struct TimeLimit {
+  std::chrono::microseconds time{std::chrono::seconds{30}};
+  bool is_option = false;  // the person can change it by --timeout-s
+};
+
+// Of the option --timeout-s.
+inline TimeLimit timeout(double seconds) {
+  return {std::chrono::duration_cast<std::chrono::microseconds>(std::chrono::duration<double>{seconds}), true};
+}
 
 // Where the station listens.
 struct StationPlace {

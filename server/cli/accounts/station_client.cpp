@@ -1,21 +1,15 @@
-// HTTP by Beast, without a loop: a tool has nothing else to do while it waits.
+// Where the station is, and what a tool makes of its answers; station_requests.cpp has the connections.
 #include "server/cli/accounts/station_client.hpp"
 
 #include <fmt/format.h>
 
-#include <boost/asio/connect.hpp>
-#include <boost/asio/ssl.hpp>
-#include <boost/beast/core/flat_buffer.hpp>
 #include <fstream>
 #include <stdexcept>
 
-#include "server/cli/accounts/station_http.hpp"
 #include "server/config/endpoint.hpp"
-#include "server/storage/database/finished_file.hpp"
 
 namespace server::cli {
 namespace asio = boost::asio;
-namespace http = boost::beast::http;
 
 namespace {
 
@@ -45,46 +39,6 @@ std::string token_of(const std::filesystem::path& file) {
   return token;
 }
 
-template <class Stream>
-StationAnswer converse(Stream& stream, const HttpRequest& request) {
-  http::write(stream, request);
-  boost::beast::flat_buffer buffer;
-  http::response_parser<http::string_body> parser;
-  parser.body_limit(kMaxAnswerBytes);
-  http::read(stream, buffer, parser);
-  return answer_of(parser.release());
-}
-
-// The body goes into the file; that of a refusal is the answer.
-template <class Stream>
-StationAnswer download(Stream& stream, const HttpRequest& request, const std::filesystem::path& file) {
-  http::write(stream, request);
-  boost::beast::flat_buffer buffer;
-  http::response_parser<http::empty_body> head;
-  http::read_header(stream, buffer, head);
-  if (head.get().result() != http::status::ok) {
-    http::response_parser<http::string_body> refusal{std::move(head)};
-    http::read(stream, buffer, refusal);
-    return answer_of(refusal.release());
-  }
-  http::response_parser<http::file_body> parser{std::move(head)};
-  parser.body_limit(boost::none);
-  boost::beast::error_code failed;
-  parser.get().body().open(file.c_str(), boost::beast::file_mode::write, failed);
-  if (failed) throw std::runtime_error{fmt::format("cannot write '{}': {}", file.string(), failed.message())};
-  http::read(stream, buffer, parser);
-  return {200, nullptr, {}};
-}
-
-template <class Talk>
-StationAnswer talk_in_tls(asio::ip::tcp::socket& socket, const std::filesystem::path& certificate, const Talk& talk) {
-  asio::ssl::context context{asio::ssl::context::tls_client};
-  asio::ssl::stream<asio::ip::tcp::socket&> stream{socket, context};
-  stream.handshake(asio::ssl::stream_base::client);
-  check_certificate(stream.native_handle(), certificate);
-  return talk(stream);
-}
-
 }  // namespace
 
 nlohmann::json asked(StationAnswer answer) {
@@ -95,37 +49,26 @@ nlohmann::json asked(StationAnswer answer) {
       fmt::format("the station refused: {}", says_why ? answer.body.value("detail", "no reason") : "no reason")};
 }
 
-StationClient::StationClient(const std::filesystem::path& data_dir) : token_{token_of(data_dir / "rheonaut.token")} {
+StationClient::StationClient(const std::filesystem::path& data_dir)
+    : data_dir_{data_dir}, token_{token_of(data_dir / "rheonaut.token")} {
   const nlohmann::json announcement = announcement_in(data_dir / "endpoints.json");
   place_.endpoint = endpoint_of(announcement);
   place_.certificate = announcement.value("tls_certificate", "");
 }
 
-template <class Talk>
-StationAnswer StationClient::with_connection(const Talk& talk) const {
-  try {
-    asio::io_context loop;
-    asio::ip::tcp::socket socket{loop};
-    socket.connect(place_.endpoint);
-    return place_.certificate.empty() ? talk(socket) : talk_in_tls(socket, place_.certificate, talk);
-  } catch (const std::exception& error) {
-    throw std::runtime_error{
-        fmt::format("the station on {} does not answer: {}", config::text(place_.endpoint), error.what())};
-  }
+StationAnswer StationClient::ask(const std::string& method, const std::string& target, const nlohmann::json& body,
+                                 TimeLimit limit) const {
+  StationAnswer answer = ask_at_once({{method, target, body}}, limit.time).front();
+  if (answer.status != 0) return answer;
+  const bool may_act = method != "GET" && answer.may_have_arrived;
+  throw std::runtime_error{
+      answer.text + (answer.is_silent ? advice(limit) : "") +
+      (may_act ? "; the station may have got the request and act on it: look before you repeat it" : "")};
 }
 
-StationAnswer StationClient::ask(const std::string& method, const std::string& target,
-                                 const nlohmann::json& body) const {
-  const HttpRequest request = request_to(method, target, token_, body);
-  return with_connection([&](auto& stream) { return converse(stream, request); });
-}
-
-void StationClient::save(const std::string& target, const std::filesystem::path& file) const {
-  const HttpRequest request = request_to("GET", target, token_, nullptr);
-  const storage::Draft part{std::filesystem::path{file}.concat(".part")};
-  StationAnswer answer = with_connection([&](auto& stream) { return download(stream, request, part.path()); });
-  asked(std::move(answer));
-  storage::finish_file(part.path(), file);
+std::string StationClient::advice(TimeLimit limit) const {
+  return fmt::format("; it is busy, hangs or is halted: rheonaut doctor --data '{}' examines it{}", data_dir_.string(),
+                     limit.is_option ? "; --timeout-s waits longer" : "");
 }
 
 }  // namespace server::cli

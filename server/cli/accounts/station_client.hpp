@@ -20,21 +20,23 @@ class StationClient {
   // Reads endpoints.json and rheonaut.token. Throws std::runtime_error when either is not there.
   explicit StationClient(const std::filesystem::path& data_dir);
 
-  // One connection a request. Throws std::runtime_error when nobody answers in JSON.
-  StationAnswer ask(const std::string& method, const std::string& target, const nlohmann::json& body = nullptr) const;
+  // One connection a request. Throws std::runtime_error when nobody answers in JSON, or not within the limit.
+  StationAnswer ask(const std::string& method, const std::string& target, const nlohmann::json& body = nullptr,
+                    TimeLimit limit = {}) const;
 
   // All at the same time, each on a connection of its own, so that none waits for the answer to another. An answer that
   // has not come within `patience` has status 0. Never throws for what the station does.
   std::vector<StationAnswer> ask_at_once(const std::vector<StationRequest>& requests, microseconds patience) const;
 
-  // The body of GET as a file, whatever its size; one that is there is replaced when it is whole. Throws
-  // std::runtime_error saying what the station refused, or that it cannot be written.
-  void save(const std::string& target, const std::filesystem::path& file) const;
+  // The body of GET as a file, whatever its size; one that is there is replaced when it is whole. The limit is that of
+  // each wait: for its beginning, then for each further part. Throws std::runtime_error saying what the station
+  // refused, that nothing came any more, or that it cannot be written.
+  void save(const std::string& target, const std::filesystem::path& file, TimeLimit limit) const;
 
  private:
-  template <class Talk>
-  StationAnswer with_connection(const Talk& talk) const;
+  std::string advice(TimeLimit limit) const;  // what to do about a station that is silent
 
+  std::filesystem::path data_dir_;
   StationPlace place_;
   std::string token_;
 };

@@ -19,11 +19,13 @@ void add_options(CLI::App& command, CapsuleQuestion& options) {
       ->check(whole(1, std::numeric_limits<std::int64_t>::max()));
   command.add_option("--to", options.file, "The archive; one that is there is replaced")->required()->check(named());
   command.add_option("--data", options.data_dir, "Folder of the station (default: rheonaut-data)")->check(named());
+  add_timeout_option(command, options.timeout_s);
   command.footer("Example: rheonaut capsule 1 --to run-1.eln --data lab");
 }
 
 int run(const CapsuleQuestion& options, std::ostream& out) {
-  StationClient{options.data_dir}.save(fmt::format("/api/v1/runs/{}/capsule.eln", options.run), options.file);
+  StationClient{options.data_dir}.save(fmt::format("/api/v1/runs/{}/capsule.eln", options.run), options.file,
+                                       timeout(options.timeout_s));
   fmt::print(out, "{} ({} bytes)\n", options.file.string(), std::filesystem::file_size(options.file));
   return 0;
 }

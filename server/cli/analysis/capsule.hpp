@@ -5,6 +5,8 @@
 #include <filesystem>
 #include <iosfwd>
 
+#include "server/cli/terminal/options.hpp"
+
 namespace CLI {
 class App;
 }
@@ -13,6 +15,7 @@ namespace server::cli {
 
 struct CapsuleQuestion {
   std::filesystem::path data_dir = "rheonaut-data";
+  double timeout_s = kLongAnswer_s;
   std::int64_t run = 0;
   std::filesystem::path file;
 };

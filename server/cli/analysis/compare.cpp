@@ -106,6 +106,7 @@ void add_options(CLI::App& command, CompareQuestion& options) {
       ->check(named());
   add_options(command, options.traces);
   command.add_option("--data", options.data_dir, "Folder of the station (default: rheonaut-data)")->check(named());
+  add_timeout_option(command, options.timeout_s);
   add_json_and_csv_flags(command, options.form);
   command.footer("Example: rheonaut compare 1 2 3 --at step --csv --data lab > steps.csv");
 }
@@ -113,7 +114,7 @@ void add_options(CLI::App& command, CompareQuestion& options) {
 int run(const CompareQuestion& options, std::ostream& out) {
   const std::string target = fmt::format("/api/v1/run-comparison/traces?{}&channels={}",
                                          query_of(options.runs, options.traces), options.channels);
-  const json compared = asked(StationClient{options.data_dir}.ask("GET", target));
+  const json compared = asked(StationClient{options.data_dir}.ask("GET", target, nullptr, timeout(options.timeout_s)));
   if (options.form.is_json) {
     fmt::print(out, "{}\n", compared.dump());
   } else if (options.form.is_csv) {

@@ -8,12 +8,14 @@
 #include <vector>
 
 #include "server/cli/analysis/trace_options.hpp"
+#include "server/cli/terminal/options.hpp"
 #include "server/cli/terminal/output.hpp"
 
 namespace server::cli {
 
 struct CompareQuestion {
   std::filesystem::path data_dir = "rheonaut-data";
+  double timeout_s = kLongAnswer_s;
   std::vector<std::int64_t> runs;
   std::string channels = "position_m,duty";
   TraceOptions traces;

@@ -80,6 +80,7 @@ void add_options(CLI::App& command, ImpedanceMapQuestion& options) {
   command.add_option("--bin-mm", options.bin_mm, "Width of a bin of the position (default: 5)")
       ->check(whole(analysis::kNarrowestBinMm, analysis::kWidestBinMm));
   command.add_option("--data", options.data_dir, "Folder of the station (default: rheonaut-data)")->check(named());
+  add_timeout_option(command, options.timeout_s);
   add_json_and_csv_flags(command, options.form);
   command.footer("Example: rheonaut impedance-map 1 --bin-mm 10 --data lab");
 }
@@ -89,7 +90,7 @@ int run(const ImpedanceMapQuestion& options, std::ostream& out) {
   const std::string of = is_one ? fmt::format("runs/{}/impedance-map?", options.runs.front())
                                 : fmt::format("run-comparison/impedance-map?runs={}&", fmt::join(options.runs, ","));
   const std::string target = fmt::format("/api/v1/{}bin_mm={}", of, options.bin_mm);
-  const json answer = asked(StationClient{options.data_dir}.ask("GET", target));
+  const json answer = asked(StationClient{options.data_dir}.ask("GET", target, nullptr, timeout(options.timeout_s)));
   const json& map = is_one ? answer : answer.at("together");
   if (options.form.is_json) {
     fmt::print(out, "{}\n", answer.dump(2));

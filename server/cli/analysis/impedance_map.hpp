@@ -6,12 +6,14 @@
 #include <iosfwd>
 #include <vector>
 
+#include "server/cli/terminal/options.hpp"
 #include "server/cli/terminal/output.hpp"
 
 namespace server::cli {
 
 struct ImpedanceMapQuestion {
   std::filesystem::path data_dir = "rheonaut-data";
+  double timeout_s = kLongAnswer_s;
   std::vector<std::int64_t> runs;
   int bin_mm = 5;
   OutputForm form;

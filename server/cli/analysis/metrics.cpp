@@ -74,6 +74,7 @@ void add_options(CLI::App& command, MetricsQuestion& options) {
       ->expected(1, 50)
       ->check(whole(1, std::numeric_limits<std::int64_t>::max()));
   command.add_option("--data", options.data_dir, "Folder of the station (default: rheonaut-data)")->check(named());
+  add_timeout_option(command, options.timeout_s);
   command.add_flag("--json", options.json, "As JSON");
   command.footer("Example: rheonaut metrics 1 2 3 --data lab");
 }
@@ -82,7 +83,7 @@ int run(const MetricsQuestion& options, std::ostream& out) {
   const bool is_one = options.runs.size() == 1;
   const std::string target = is_one ? fmt::format("/api/v1/runs/{}/metrics", options.runs.front())
                                     : fmt::format("/api/v1/run-comparison?runs={}", fmt::join(options.runs, ","));
-  const json answer = asked(StationClient{options.data_dir}.ask("GET", target));
+  const json answer = asked(StationClient{options.data_dir}.ask("GET", target, nullptr, timeout(options.timeout_s)));
   if (options.json) {
     fmt::print(out, "{}\n", answer.dump(2));
   } else if (is_one) {

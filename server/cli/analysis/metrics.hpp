@@ -6,6 +6,8 @@
 #include <iosfwd>
 #include <vector>
 
+#include "server/cli/terminal/options.hpp"
+
 namespace CLI {
 class App;
 }
@@ -14,6 +16,7 @@ namespace server::cli {
 
 struct MetricsQuestion {
   std::filesystem::path data_dir = "rheonaut-data";
+  double timeout_s = kLongAnswer_s;
   std::vector<std::int64_t> runs;
   bool json = false;
 };

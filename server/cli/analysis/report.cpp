@@ -21,6 +21,7 @@ void add_options(CLI::App& command, ReportQuestion& options) {
   command.add_option("--to", options.file, "The HTML file; one that is there is replaced")->required()->check(named());
   add_options(command, options.traces);
   command.add_option("--data", options.data_dir, "Folder of the station (default: rheonaut-data)")->check(named());
+  add_timeout_option(command, options.timeout_s);
   command.footer(
       "The options of the alignment are those of several runs.\n"
       "Example: rheonaut report 1 2 3 --at step --to steps.html --data lab");
@@ -30,7 +31,7 @@ int run(const ReportQuestion& options, std::ostream& out) {
   const std::string target = options.runs.size() == 1 ? fmt::format("/api/v1/runs/{}/report.html", options.runs.front())
                                                       : fmt::format("/api/v1/run-comparison/report.html?{}",
                                                                     query_of(options.runs, options.traces));
-  StationClient{options.data_dir}.save(target, options.file);
+  StationClient{options.data_dir}.save(target, options.file, timeout(options.timeout_s));
   fmt::print(out, "{}\n", options.file.string());
   return 0;
 }

@@ -7,11 +7,13 @@
 #include <vector>
 
 #include "server/cli/analysis/trace_options.hpp"
+#include "server/cli/terminal/options.hpp"
 
 namespace server::cli {
 
 struct ReportQuestion {
   std::filesystem::path data_dir = "rheonaut-data";
+  double timeout_s = kLongAnswer_s;
   std::vector<std::int64_t> runs;
   TraceOptions traces;  // of several
   std::filesystem::path file;

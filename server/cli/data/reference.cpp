@@ -144,8 +144,8 @@ json json_of(const analysis::ReferenceRequest& request) {
 }
 
 json ask_station(const ReferenceCommand& options, const std::string& path, const json& body) {
-  const StationAnswer answer =
-      StationClient{options.data_dir}.ask("POST", fmt::format("/api/v1/runs/{}/reference{}", options.run, path), body);
+  const std::string target = fmt::format("/api/v1/runs/{}/reference{}", options.run, path);
+  const StationAnswer answer = StationClient{options.data_dir}.ask("POST", target, body, timeout(options.timeout_s));
   if (answer.status < kFirstProblem) return answer.body;
   throw std::runtime_error{answer.body.value("detail", fmt::format("the station answers {}", answer.status))};
 }
@@ -241,6 +241,7 @@ void add_options(CLI::App& command, ReferenceCommand& options) {
       ->check(whole(0, std::numeric_limits<std::uint32_t>::max()));
   importing->add_flag("--keep-zero", options.keeps_zero, "Its zero is the robot's (default: estimated from the run)");
   importing->add_flag("--metres", options.is_in_metres, "Its positions are in metres, also where they do not look so");
+  add_timeout_option(*importing, options.timeout_s);
   importing->add_option("--reason", options.reason, "Why another reference of the run is replaced")->check(named());
   importing->footer(
       "Without --offset-s, --utc-s or --marker the clock is found by correlation with the robot's own motion.\n"

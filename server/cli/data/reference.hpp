@@ -10,6 +10,7 @@
 #include <string>
 
 #include "server/analysis/reference_import.hpp"
+#include "server/cli/terminal/options.hpp"
 
 namespace CLI {
 class App;
@@ -21,6 +22,7 @@ struct ReferenceCommand {
   enum class Act : std::uint8_t { import, show, export_positions, remove };
   Act act = Act::show;
   std::filesystem::path data_dir = "rheonaut-data";
+  double timeout_s = kLongAnswer_s;
   storage::RunId run = 0;
   std::string csv_file;
   std::optional<double> sd_mm, offset_s, utc_s, at_s, clock_sd_s, search_from_s, search_to_s;

@@ -35,8 +35,8 @@ constexpr const char* kNotKnown = "{}; IT IS NOT KNOWN whether anything was stop
 struct StopOutcome {
   std::string robot_id;
   bool is_confirmed = false;
-  json record;                                                // of the command; null when there is none
-  std::string why = "it has not answered; the stop is kept";  // of one that is not confirmed
+  json record;      // of the command; null when there is none
+  std::string why;  // of one that is not confirmed; empty while it is not known
 };
 
 // SAFETY: only what the robot itself has acknowledged counts as a stop; sent or queued is not enough.
@@ -46,15 +46,18 @@ bool is_confirmed(const json& record) {
 }
 
 StopOutcome outcome_of(std::string robot_id, const json& record) {
-  return {std::move(robot_id), is_confirmed(record), record};
+  return {std::move(robot_id), is_confirmed(record), record, ""};
 }
 
-// Why a robot whose stop the station holds has not confirmed it. Asked when nothing waits for the answer any more.
+// Why a robot whose stop the station holds has not confirmed it.
+// SAFETY: asked when the person has read the outcome, for it takes up to kExplanationPatience.
 void explain(const StationClient& station, std::vector<StopOutcome>& outcomes) {
   std::vector<StopOutcome*> open;
   std::vector<StationRequest> requests;
   for (StopOutcome& one : outcomes) {
-    if (one.is_confirmed || !one.record.is_object() || open.size() == kMostExplained) continue;
+    if (one.is_confirmed || !one.why.empty()) continue;
+    one.why = "it has not answered; the stop is kept";
+    if (open.size() == kMostExplained) continue;
     open.push_back(&one);
     requests.push_back({"GET", "/api/v1/robots/" + one.robot_id});
   }
@@ -146,19 +149,28 @@ std::string after_text(const json& record) {
 }
 
 // Those that are not confirmed come last, where the person looks first.
-void write_as_text(std::ostream& out, std::vector<StopOutcome> outcomes, std::int64_t answered_after_us) {
-  std::ranges::sort(outcomes, {}, [](const StopOutcome& one) { return std::pair{!one.is_confirmed, one.robot_id}; });
+void write_as_text(std::ostream& out, const std::vector<StopOutcome>& outcomes, std::int64_t answered_after_us) {
   std::size_t width = 0;
   for (const StopOutcome& one : outcomes) width = std::max(width, one.robot_id.size());
   for (const StopOutcome& one : outcomes) {
-    const std::string said = one.is_confirmed ? fmt::format("stopped: the robot confirmed{}", after_text(one.record))
-                                              : "NOT CONFIRMED: " + one_line(one.why);
+    const std::string said = one.is_confirmed  ? fmt::format("stopped: the robot confirmed{}", after_text(one.record))
+                             : one.why.empty() ? "NOT CONFIRMED"
+                                               : "NOT CONFIRMED: " + one_line(one.why);
     fmt::print(out, "{:<{}}  {}\n", one_line(one.robot_id), width, said);
   }
   if (outcomes.empty()) fmt::print(out, "this station knows no robot\n");
   fmt::print(out, "{} of {} robots confirmed; the station answered after {:.0f} ms\n",
              std::ranges::count_if(outcomes, &StopOutcome::is_confirmed), outcomes.size(),
              static_cast<double>(answered_after_us) / 1000);
+  out.flush();
+}
+
+// Of those whose reason was not known yet.
+void write_reasons(std::ostream& out, const std::vector<StopOutcome>& before, const std::vector<StopOutcome>& now) {
+  for (std::size_t i = 0; i < now.size(); ++i) {
+    if (now[i].is_confirmed || !before[i].why.empty()) continue;
+    fmt::print(out, "{}: {}\n", one_line(now[i].robot_id), one_line(now[i].why));
+  }
 }
 
 StationClient client_of(const std::filesystem::path& data_dir) {
@@ -193,11 +205,14 @@ int run(const StopCommand& options, std::ostream& out) {
   const StationClient station = client_of(options.data_dir);
   std::vector<StopOutcome> outcomes = options.robots.empty() ? stop_all(station) : stop_each(station, options.robots);
   const std::int64_t answered_after_us = clock.steady_us() - begun_us;
+  std::ranges::sort(outcomes, {}, [](const StopOutcome& one) { return std::pair{!one.is_confirmed, one.robot_id}; });
+  if (!options.form.is_json) write_as_text(out, outcomes, answered_after_us);
+  const std::vector<StopOutcome> written = outcomes;
   explain(station, outcomes);
   if (options.form.is_json) {
     write_as_json(out, outcomes, answered_after_us);
   } else {
-    write_as_text(out, outcomes, answered_after_us);
+    write_reasons(out, written, outcomes);
   }
   const bool is_done = !outcomes.empty() && std::ranges::all_of(outcomes, &StopOutcome::is_confirmed);
   return is_done ? 0 : kNotConfirmed;

@@ -23,8 +23,9 @@ struct StopCommand {
 
 void add_options(CLI::App& command, StopCommand& options);
 
-// A line for each robot: whether it has confirmed, and after how many ms. 0 when each has, else kNotConfirmed. Takes at
-// most 8 s, whatever the station does, and asks nothing. Throws std::runtime_error when the station answers for no
+// A line for each robot: whether it has confirmed, and after how many ms; flushed at once, before the reasons of those
+// that have not are asked for. As JSON it is one document, with the reasons. 0 when each has, else kNotConfirmed. Takes
+// at most 8 s, whatever the station does, and asks nothing. Throws std::runtime_error when the station answers for no
 // robot at all; it says whether nothing was stopped, or whether that is not known.
 inline constexpr int kNotConfirmed = 5;
 int run(const StopCommand& options, std::ostream& out);

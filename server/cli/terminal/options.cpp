@@ -62,4 +62,10 @@ CLI::Validator named() {
   return CLI::Validator{refuse, ""};
 }
 
+void add_timeout_option(CLI::App& command, double& timeout_s) {
+  command
+      .add_option("--timeout-s", timeout_s, "Longest wait for the station's answer, or for more of it (default: 600)")
+      ->check(from_to(0.1, 86'400));
+}
+
 }  // namespace server::cli

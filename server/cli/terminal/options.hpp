@@ -26,6 +26,10 @@ CLI::Validator from_to(double low, double high);
 CLI::Validator whole(long long low, long long high);
 CLI::Validator named();  // any text but the empty one, which an unset variable of the shell leaves
 
+// For commands whose answer a station may compute for minutes.
+inline constexpr double kLongAnswer_s = 600;
+void add_timeout_option(CLI::App& command, double& timeout_s);
+
 // One of `values`, by the word that text() gives it.
 template <class T, class Target, std::size_t count>
 CLI::Option* add_word(CLI::App& command, const char* name, Target& target, std::array<T, count> values,

@@ -4,6 +4,9 @@
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/read_until.hpp>
 #include <boost/asio/write.hpp>
+#include <functional>
+#include <mutex>
+#include <sstream>
 #include <thread>
 
 #include "tests/server/cli/tool_test.hpp"
@@ -17,7 +20,9 @@ using asio::ip::tcp;
 // Answers nothing before as many requests have come as it expects; then all, the last one first.
 class SlowStation {
  public:
-  SlowStation(const std::filesystem::path& data_dir, std::vector<std::string> answers) : answers_{std::move(answers)} {
+  SlowStation(const std::filesystem::path& data_dir, std::vector<std::string> answers,
+              std::function<std::string()> then = {})
+      : answers_{std::move(answers)}, then_{std::move(then)} {
     std::filesystem::create_directories(data_dir);
     std::ofstream{data_dir / "rheonaut.token"} << "secret\n";
     std::ofstream{data_dir / "endpoints.json"}
@@ -36,15 +41,20 @@ class SlowStation {
       std::string request;
       asio::read_until(open.back(), asio::dynamic_buffer(request), "\r\n\r\n");
     }
-    for (std::size_t i = open.size(); i-- > 0;) {
-      const std::string text =
-          "HTTP/1.1 200 OK\r\nContent-Type: application/json\r\nContent-Length: " + std::to_string(answers_[i].size()) +
-          "\r\n\r\n" + answers_[i];
-      asio::write(open[i], asio::buffer(text));
-    }
+    for (std::size_t i = open.size(); i-- > 0;) answer(open[i], answers_[i]);
+    if (!then_) return;
+    tcp::socket question = acceptor_.accept();
+    answer(question, then_());
+  }
+  static void answer(tcp::socket& socket, const std::string& body) {
+    const std::string text =
+        "HTTP/1.1 200 OK\r\nContent-Type: application/json\r\nContent-Length: " + std::to_string(body.size()) +
+        "\r\n\r\n" + body;
+    asio::write(socket, asio::buffer(text));
   }
 
   std::vector<std::string> answers_;
+  std::function<std::string()> then_;  // the answer to the question after these
   asio::io_context loop_;
   tcp::acceptor acceptor_{loop_, {asio::ip::address_v4::loopback(), 0}};
   std::thread thread_;
@@ -73,6 +83,46 @@ TEST_F(StopTool, WhatTheRobotHasNotAcknowledgedIsNotConfirmed) {
   EXPECT_EQ(answer.exit_code, 5);
   EXPECT_EQ(answer.json()["not_confirmed"], 1);
   EXPECT_FALSE(answer.json()["robots"][0]["confirmed"].get<bool>());
+}
+
+// A terminal that knows what a person has read so far: what was flushed.
+class Terminal : public std::stringbuf {
+ public:
+  std::string read() const {
+    const std::lock_guard lock{mutex_};
+    return read_;
+  }
+
+ protected:
+  int sync() override {
+    const std::lock_guard lock{mutex_};
+    read_ = str();
+    return 0;
+  }
+
+ private:
+  mutable std::mutex mutex_;
+  std::string read_;
+};
+
+// SAFETY: the person reads who is not stopped before the tool asks why.
+TEST_F(StopTool, TheOutcomeIsPrintedBeforeItsReasonsAreAskedFor) {
+  Terminal terminal;
+  std::string read_before;
+  const std::string sent = R"({"robot_id":"a","state":"sent","acknowledged_after_us":null})";
+  const SlowStation station{folder_ / "data", {sent}, [&] {
+                              read_before = terminal.read();
+                              return std::string{R"({"robot_id":"a","link":"lost"})"};
+                            }};
+  StopCommand command;
+  command.data_dir = folder_ / "data";
+  command.robots = {"a"};
+  std::ostream out{&terminal};
+  EXPECT_EQ(answer(CommandLine{command}, out), 5);
+  EXPECT_THAT(read_before, ::testing::StartsWith("a  NOT CONFIRMED\n0 of 1 robots confirmed;"));
+  EXPECT_THAT(terminal.str(),
+              ::testing::EndsWith("\na: it is not connected; the stop is kept and is sent first when it "
+                                  "connects\n"));
 }
 
 TEST_F(StopTool, AStationWithoutRobotsHasStoppedNothing) {
