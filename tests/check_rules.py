@@ -32,7 +32,7 @@ control/models control/responses control/sensor control/search control/identific
 control/tuning sim_robot/world sim_robot/robot sim_robot/network sim_robot/faults sim_robot/scenario sim_robot/lab
 sim_robot/client sim_robot/fleet sim_robot/proxy sim_robot/cli
 server/runtime server/config server/tls server/net
-server/station/state server/station/commands server/station server/station/models server/link server/live
+server/station/state server/station/commands server/station server/station/models server/link server/live server/live/foxglove
 server/storage/database server/storage/audit server/storage/samples server/storage/commits server/storage/ingest server/storage/groups
 server/storage/runs server/storage/jobs server/storage/designs server/storage/experiments server/storage/reservations
 server/storage/query server/storage/export server/storage/export/mat server/storage/export/mcap server/storage/upkeep server/storage

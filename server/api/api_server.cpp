@@ -44,6 +44,7 @@ ApiOptions api_options(const config::Config& config, std::uint64_t store_id, std
   options.store_id = store_id;
   options.robots_address = std::move(robots_address);
   options.security = &security;
+  options.foxglove = config.foxglove;
   return options;
 }
 
@@ -62,11 +63,15 @@ ApiServer::ApiServer(boost::asio::io_context& loop, runtime::TaskGroup& tasks, r
       documents_{{analysis, clock, recording.digester, recording.history, recording.metrics, recording.runs}},
       facts_{facts_of(options, listener_, clock)},
       live_{loop, tasks, clock, station, live, texts_, options.version},
-      upgrades_{"/live",
-                [this](http::HttpStream stream, http::UpgradeRequest upgrade, identity::Caller caller) {
-                  return serve_live(std::move(stream), std::move(upgrade), std::move(caller), live_);
-                }},
+      foxglove_clients_{live_, foxglove_feed_, std::to_string(clock.utc_us())},
+      tickets_{clock},
+      foxglove_{options.foxglove, foxglove_clients_, tickets_, facts_},
+      upgrades_{{{"/live", {[this](http::HttpStream stream, http::UpgradeRequest upgrade, identity::Caller caller) {
+                    return serve_live(std::move(stream), std::move(upgrade), std::move(caller), live_);
+                  }}},
+                 {"/foxglove", foxglove_upgrade(foxglove_)}}},
       server_{tasks, clock, listener_, options.security->http(), guard_, router_, upgrades_} {
+  if (options.foxglove) station.add_sink(foxglove_feed_);
   add_routes(loop, station, live, recording, analysis, experiments);
 }
 
@@ -108,6 +113,7 @@ void ApiServer::add_routes(boost::asio::io_context& loop, station::Station& stat
   connect_fits(experiments, {clock_, analysis, recording.jobs});
   experiments.set_on_change(
       [&live](const experiments::ExperimentView& view) { live.publish_experiment(summary_json(view)); });
+  add_foxglove_routes(router_, foxglove_);
   add_audit_routes(router_, {clock_, history, recording.recorder});
 }
 

@@ -9,6 +9,7 @@
 
 #include "server/analysis/documents/run_documents.hpp"
 #include "server/api/experiments/experiment_routes.hpp"
+#include "server/api/foxglove_routes.hpp"
 #include "server/api/live_messages.hpp"
 #include "server/api/routes/routes.hpp"
 #include "server/config/config.hpp"
@@ -31,6 +32,7 @@ struct ApiOptions {
   std::string robots_address;                  // "127.0.0.1:7070", for people
   net::TransportSecurity* security = nullptr;  // must be given
   runtime::PasswordCost password_cost;
+  bool foxglove = false;  // /foxglove is served
 };
 
 ApiOptions api_options(const config::Config& config, std::uint64_t store_id, std::string robots_address,
@@ -73,6 +75,10 @@ class ApiServer {
   analysis::RunDocuments documents_;
   StationFacts facts_;
   LiveParts live_;
+  live::foxglove::Feed foxglove_feed_;
+  FoxgloveClients foxglove_clients_;
+  identity::Tickets tickets_;
+  FoxgloveRoutes foxglove_;
   http::Upgrades upgrades_;
   http::Router router_;
   http::HttpServer server_;

@@ -10,9 +10,9 @@
 #include <boost/beast/core/buffers_to_string.hpp>
 #include <boost/beast/core/flat_buffer.hpp>
 #include <boost/beast/websocket.hpp>
-#include <limits>
 
 #include "server/api/bodies/json.hpp"
+#include "server/api/peer_watch.hpp"
 
 namespace server::api {
 namespace asio = boost::asio;
@@ -23,17 +23,11 @@ using namespace asio::experimental::awaitable_operators;  // NOLINT: operators o
 namespace {
 
 constexpr std::size_t kMaxMessageBytes = 4096;
-constexpr std::int64_t kPingAfterUs = 10'000'000;
-constexpr std::int64_t kSilenceUs = 30'000'000;
-constexpr std::int64_t kWritingUs = 30'000'000;  // of one message
-constexpr std::int64_t kSecondUs = 1'000'000;
-constexpr std::int64_t kNever = std::numeric_limits<std::int64_t>::max() / 2;
-constexpr int kMaxMessagesASecond = 500;  // a page that drives a robot says some 20
 
 class LivePage {
  public:
   LivePage(http::HttpStream stream, identity::Caller caller, LiveParts& parts)
-      : socket_{std::move(stream)}, caller_{std::move(caller)}, parts_{parts}, queue_{parts.loop} {
+      : socket_{std::move(stream)}, caller_{std::move(caller)}, parts_{parts}, queue_{parts.loop}, peer_{parts.clock} {
     websocket::stream_base::timeout none;  // time is the injected clock's business
     none.handshake_timeout = none.idle_timeout = websocket::stream_base::none();
     none.keep_alive_pings = false;
@@ -41,8 +35,7 @@ class LivePage {
     socket_.read_message_max(kMaxMessageBytes);
     socket_.text(true);
     socket_.auto_fragment(false);  // what is long is written in pieces already
-    received_at_us_ = parts_.clock.steady_us();
-    auto on_control = [this](websocket::frame_type, beast::string_view) { received_at_us_ = parts_.clock.steady_us(); };
+    auto on_control = [this](websocket::frame_type, beast::string_view) { peer_.on_received(); };
     socket_.control_callback(std::move(on_control));
   }
   ~LivePage() { parts_.live.remove(queue_); }
@@ -97,8 +90,9 @@ class LivePage {
     for (;;) {
       const auto [error, size] = co_await socket_.async_read(buffer, asio::as_tuple(asio::use_awaitable));
       if (error) co_return;
-      received_at_us_ = parts_.clock.steady_us();
-      if (is_too_talkative()) co_await parts_.clock.sleep_until(second_began_us_ + kSecondUs);
+      peer_.on_received();
+      // Each of its messages may become a task.
+      if (peer_.is_too_talkative()) co_await parts_.clock.sleep_until(peer_.resume_at_us());
       const auto understood = act_on(beast::buffers_to_string(buffer.data()));
       buffer.clear();
       if (!understood) {
@@ -109,25 +103,16 @@ class LivePage {
     }
   }
 
-  // Each of its messages may become a task: so many a second are read, and the page's further ones wait.
-  bool is_too_talkative() {
-    if (received_at_us_ - second_began_us_ >= kSecondUs) {
-      second_began_us_ = received_at_us_;
-      received_in_second_ = 0;
-    }
-    return ++received_in_second_ > kMaxMessagesASecond;
-  }
-
   // One message, in as many frames as it has pieces.
   asio::awaitable<bool> write_welcome() {
     live::RobotDocument welcome = welcome_message(caller_.actor, parts_);
     while (!welcome.is_whole()) {
       const std::string piece = co_await welcome.next();
       queue_.forget_states(welcome.after(), welcome.last());
-      writing_since_us_ = parts_.clock.steady_us();
+      peer_.on_write_begun();
       const auto [error, size] = co_await socket_.async_write_some(welcome.is_whole(), asio::buffer(piece),
                                                                    asio::as_tuple(asio::use_awaitable));
-      writing_since_us_ = kNever;
+      peer_.on_written();
       if (error) co_return false;
     }
     co_return true;
@@ -140,31 +125,25 @@ class LivePage {
       co_await queue_.wait();
       for (live::LiveText message = queue_.pop(); message != nullptr; message = queue_.pop()) {
         if (!parts_.turns.take()) co_await parts_.turns.wait();
-        writing_since_us_ = parts_.clock.steady_us();
+        peer_.on_write_begun();
         const auto [error, size] =
             co_await socket_.async_write(asio::buffer(*message), asio::as_tuple(asio::use_awaitable));
-        writing_since_us_ = kNever;
+        peer_.on_written();
         if (error) co_return;
       }
-      const std::int64_t now_us = parts_.clock.steady_us();
-      if (now_us - std::max(received_at_us_, pinged_at_us_) < kPingAfterUs) continue;
-      pinged_at_us_ = now_us;
+      if (!peer_.take_ping()) continue;
       const websocket::ping_data empty;
-      writing_since_us_ = now_us;
+      peer_.on_write_begun();
       const auto [error] = co_await socket_.async_ping(empty, asio::as_tuple(asio::use_awaitable));
-      writing_since_us_ = kNever;
+      peer_.on_written();
       if (error) co_return;
     }
   }
 
   // A page that says things and reads nothing is as good as gone, and would keep its queue for ever.
   asio::awaitable<void> watch() {
-    for (;;) {
-      const std::int64_t now_us = parts_.clock.steady_us();
-      if (now_us - received_at_us_ >= kSilenceUs) break;
-      if (now_us >= writing_since_us_ + kWritingUs) break;
-      co_await parts_.clock.sleep_until(std::min(received_at_us_ + kSilenceUs, now_us + kSecondUs));
-    }
+    const auto nothing = [] {};
+    co_await peer_.wait_for_silence(nothing);
     spdlog::info("the page of {} fell silent, or does not read", caller_.actor);
   }
 
@@ -172,11 +151,7 @@ class LivePage {
   identity::Caller caller_;
   LiveParts& parts_;
   live::Subscriber queue_;
-  std::int64_t received_at_us_ = 0;
-  std::int64_t pinged_at_us_ = 0;
-  std::int64_t writing_since_us_ = kNever;
-  std::int64_t second_began_us_ = 0;
-  int received_in_second_ = 0;
+  PeerWatch peer_;
 };
 
 }  // namespace

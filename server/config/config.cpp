@@ -213,6 +213,7 @@ void read(ConfigFile& file, Config& config) {
   if (file.take("recording", "backup_dir", backup_dir)) recording.backup_dir = backup_dir;
   read_tls(file, config.tls);
   file.take("experiments", "allow_unattended", config.allow_unattended);
+  file.take("foxglove", "enabled", config.foxglove);
   file.take("station", "real_time", config.real_time);
   if (file.take("log", "level", config.log_level)) {
     constexpr std::array kLevels{"trace", "debug", "info", "warn", "error"};

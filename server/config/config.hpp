@@ -69,6 +69,8 @@ struct Config {
   // SAFETY: experiments.allow_unattended: experiments may go on while nobody is there, in auto alone
   bool allow_unattended = false;
 
+  bool foxglove = false;  // foxglove.enabled: live samples by the Foxglove WebSocket protocol
+
   bool real_time = true;  // station.real_time: the loop asks for real-time priority
 
   std::string log_level = "info";   // log.level: trace, debug, info, warn, error

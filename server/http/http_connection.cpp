@@ -77,8 +77,11 @@ asio::awaitable<Next> HttpConnection::secure() {
   co_return Next::end;
 }
 
-bool HttpConnection::wants_upgrade(const Request& request, const RequestMessage& message) const {
-  return request.target.path() == upgrades_.path && boost::beast::websocket::is_upgrade(message) && buffer_.size() == 0;
+const Upgrade* HttpConnection::wanted_upgrade(const Request& request, const RequestMessage& message) const {
+  const auto found = upgrades_.at.find(request.target.path());
+  if (found == upgrades_.at.end() || !boost::beast::websocket::is_upgrade(message) || buffer_.size() > 0)
+    return nullptr;
+  return &found->second;
 }
 
 bool HttpConnection::begin_page(const identity::Caller& caller) {
@@ -185,13 +188,19 @@ asio::awaitable<Next> HttpConnection::carry_out(Request request, RequestMessage 
   auto admitted = guard_.admit(request);
   if (!admitted) co_return co_await sender_.send(std::move(admitted.error()), message);
   admit(request, std::move(*admitted));
-  if (wants_upgrade(request, message)) {
+  if (const Upgrade* wanted = wanted_upgrade(request, message)) {
+    if (wanted->admit) {
+      auto let_in = wanted->admit(request);
+      if (!let_in) co_return co_await sender_.send(std::move(let_in.error()), message);
+      admit(request, std::move(*let_in));
+    }
     if (!begin_page(request.caller)) {
       Response refused = problem(429, fmt::format("{} has {} pages open; close some", request.actor, kMaxPagesOfOne),
                                  "too_many_pages");
       co_return co_await sender_.send(std::move(refused), message);
     }
     upgrade_.emplace(message.base());
+    takes_over_ = wanted;
     caller_ = std::move(request.caller);
     co_return Next::end;
   }

@@ -35,7 +35,7 @@
 
 namespace server::http {
 
-inline constexpr std::size_t kMaxPagesOfOne = 32;  // on /live, of one user, token or link
+inline constexpr std::size_t kMaxPagesOfOne = 32;  // WebSockets, of one user, token or link
 inline constexpr microseconds kRequestTime{std::chrono::seconds{10}};
 inline constexpr microseconds kLongBodyTime{std::chrono::seconds{60}};
 inline constexpr microseconds kIdleTime{std::chrono::seconds{60}};
@@ -55,6 +55,7 @@ class HttpConnection {
   bool wants_upgrade() const { return upgrade_.has_value(); }
   HttpStream take_stream() { return std::move(stream_); }
   UpgradeRequest take_upgrade() { return std::move(*upgrade_); }
+  const Upgrade& takes_over() const { return *takes_over_; }
   const identity::Caller& caller() const { return caller_; }
 
  private:
@@ -72,7 +73,7 @@ class HttpConnection {
   boost::asio::awaitable<void> discard_rest();
 
   void note_arrival();
-  bool wants_upgrade(const Request& request, const RequestMessage& message) const;
+  const Upgrade* wanted_upgrade(const Request& request, const RequestMessage& message) const;  // null: none
   bool begin_page(const identity::Caller& caller);  // false: there are too many of one
 
   HttpStream stream_;
@@ -89,6 +90,7 @@ class HttpConnection {
   bool request_has_begun_ = false;
   std::optional<std::int64_t> unread_since_us_;  // what was read last may have waited so long; empty: it has not
   std::optional<UpgradeRequest> upgrade_;
+  const Upgrade* takes_over_ = nullptr;                // not null where there is an upgrade
   std::optional<runtime::Counted<std::size_t>> page_;  // among the pages of its caller
   identity::Caller caller_;                            // of the page
 };

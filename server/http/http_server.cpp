@@ -58,8 +58,9 @@ asio::awaitable<void> HttpServer::serve(HttpStream stream, std::unique_ptr<net::
                             router_,           upgrades_, tasks_.exceptions()};
   co_await (connection.talk() || connection.watch());
   if (!connection.wants_upgrade()) co_return;
-  co_await contained(tasks_.exceptions(), clock_, runtime::Ended::live_page, "page of " + connection.caller().actor,
-                     upgrades_.serve(connection.take_stream(), connection.take_upgrade(), connection.caller()));
+  co_await contained(
+      tasks_.exceptions(), clock_, runtime::Ended::live_page, "page of " + connection.caller().actor,
+      connection.takes_over().serve(connection.take_stream(), connection.take_upgrade(), connection.caller()));
 }
 
 }  // namespace server::http

@@ -4,7 +4,8 @@
 // a request that changes something, and /live, comes from the station's own page if from a page at all (403);
 // everything but signing in and the files of the cockpit, which hold no data, has a credential (401); a request that
 // changes something and rests on the cookie says where it comes from (403); a body is JSON (415). What the caller may
-// do is the routes' to say (Router), and of /live it is decided here: its caller may see everything (403).
+// do is the routes' to say (Router), and of /live it is decided here: its caller may see everything (403). /foxglove is
+// let in by its own ticket alone (api/foxglove_routes.hpp), whatever its origin.
 // SAFETY: of an emergency stop the body is not given to be judged (HttpConnection), so that a form of another page is
 // kept out by the origin alone.
 #pragma once

@@ -77,6 +77,7 @@ TEST_F(ConfigTest, TheDocumentedFileHoldsEveryDefault) {
   EXPECT_EQ(from_file.recording.critical_space_mb, defaults.recording.critical_space_mb);
   EXPECT_EQ(from_file.recording.backup_dir, defaults.recording.backup_dir);
   EXPECT_EQ(from_file.allow_unattended, defaults.allow_unattended);
+  EXPECT_EQ(from_file.foxglove, defaults.foxglove);
   EXPECT_EQ(from_file.real_time, defaults.real_time);
   EXPECT_EQ(from_file.log_level, defaults.log_level);
   EXPECT_EQ(from_file.log_format, defaults.log_format);

@@ -118,6 +118,7 @@ std::string config_json(const config::Config& config) {
                    {"tls.key", config.tls.key.empty() ? "default" : "set"},
                    {"tls.insecure", config.tls.insecure},
                    {"experiments.allow_unattended", config.allow_unattended},
+                   {"foxglove.enabled", config.foxglove},
                    {"station.real_time", config.real_time},
                    {"log.level", config.log_level},
                    {"log.format", config.log_format}};

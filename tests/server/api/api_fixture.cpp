@@ -64,6 +64,7 @@ ApiTest::ApiTest(config::Config of_station, storage::RecorderOptions of_recorder
   options.robots_address = "127.0.0.1:7070";
   options.security = &security;
   options.password_cost = kCheapPasswords;
+  options.foxglove = config.foxglove;
   api = std::make_unique<api::ApiServer>(loop, tasks, clock, options, station, live, recording, analysis, experiments);
   clock.add_worker(api->logins().worker());
   recording.spawn(tasks);

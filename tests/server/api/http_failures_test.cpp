@@ -133,14 +133,15 @@ TEST(HttpServer, AnExceptionOfARouteIs500AndSaysNothing) {
   live::LiveFeed feed{clock};
   live::RobotTexts texts{loop, station};
   api::LiveParts live{loop, tasks, clock, station, feed, texts, "0"};
-  http::Upgrades upgrades{"/live", [&](http::HttpStream stream, http::UpgradeRequest upgrade, identity::Caller caller) {
-                            return serve_live(std::move(stream), std::move(upgrade), std::move(caller), live);
-                          }};
+  const auto serve = [&](http::HttpStream stream, http::UpgradeRequest upgrade, identity::Caller caller) {
+    return serve_live(std::move(stream), std::move(upgrade), std::move(caller), live);
+  };
+  http::Upgrades upgrades{{{"/live", {serve}}}};
   net::Listener listener{loop, clock, {boost::asio::ip::address_v4::loopback(), 0}};
   NewCredentials credentials{loop, clock, folder.path()};
   const http::RequestGuard guard{credentials.auth, {}};
   http::Router router;
-  router.add({"GET", "/broken", identity::Scope::anyone, {}, [](http::Request) -> http::Answer {
+  router.add({"GET", "/broken", identity::Scope::anyone, {"code"}, [](http::Request) -> http::Answer {
                 throw std::runtime_error{"secret"};
               }});
   router.add({"GET", "/cut", identity::Scope::anyone, {}, [](http::Request) -> http::Answer {
@@ -153,9 +154,10 @@ TEST(HttpServer, AnExceptionOfARouteIs500AndSaysNothing) {
   tasks.spawn("http", server.run());
   {
     RawClient client{clock, listener.endpoint().port()};
-    client.send("GET /broken HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n");
+    client.send("GET /broken?code=4711 HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n");
     const std::string answer = client.read_to_end();
     EXPECT_TRUE(answer.starts_with("HTTP/1.1 500 ")) << answer;
+    EXPECT_FALSE(log.has("4711")) << "a one-time code is never logged";
     EXPECT_FALSE(says(answer, "secret"));
   }
   EXPECT_TRUE(log.has("GET /broken: secret")) << log.text();
@@ -198,9 +200,10 @@ TEST(HttpServer, AnExceptionOfAPageEndsThatPageOnly) {
   live::LiveFeed feed{clock};
   live::RobotTexts texts{loop, station};
   api::LiveParts live{loop, tasks, broken, station, feed, texts, "0"};
-  http::Upgrades upgrades{"/live", [&](http::HttpStream stream, http::UpgradeRequest upgrade, identity::Caller caller) {
-                            return serve_live(std::move(stream), std::move(upgrade), std::move(caller), live);
-                          }};
+  const auto serve = [&](http::HttpStream stream, http::UpgradeRequest upgrade, identity::Caller caller) {
+    return serve_live(std::move(stream), std::move(upgrade), std::move(caller), live);
+  };
+  http::Upgrades upgrades{{{"/live", {serve}}}};
   net::Listener listener{loop, clock, {boost::asio::ip::address_v4::loopback(), 0}};
   NewCredentials credentials{loop, clock, folder.path()};
   identity::Auth& auth = credentials.auth;

@@ -1,4 +1,4 @@
-// A page on /live, with WebSocket frames made by hand.
+// A page on /live, or another WebSocket, with WebSocket frames made by hand.
 #pragma once
 
 #include <functional>
@@ -13,13 +13,13 @@ class Page {
   // `meanwhile` is called once it is connected: what it begins happens while the page opens.
   Page(
       VirtualClock& clock, std::uint16_t port, const std::string& headers, const char* from = "127.0.0.1",
-      const std::function<void()>& meanwhile = [] {})
+      const std::function<void()>& meanwhile = [] {}, const std::string& target = "/live")
       : client_{clock, port, from} {
     meanwhile();
-    client_.send(
-        "GET /live HTTP/1.1\r\nHost: localhost\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
-        "Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n" +
-        headers + "\r\n");
+    client_.send("GET " + target +
+                 " HTTP/1.1\r\nHost: localhost\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+                 "Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n" +
+                 headers + "\r\n");
     answer = client_.read_until("\r\n\r\n");
   }
 
@@ -38,6 +38,11 @@ class Page {
     }
     return nullptr;
   }
+
+  void say_bytes(const std::string& bytes) { send_frame('\x82', bytes); }
+
+  // Of text or bytes; none: it was closed.
+  std::optional<std::string> next_text() { return next_message(); }
 
   // The next message, of whatever type; null when none comes.
   json next() {

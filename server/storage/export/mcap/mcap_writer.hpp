@@ -44,7 +44,6 @@ class McapWriter {
   bool write_tables();
   bool write_samples(SQLite::Database& database);
   void write(const ExportSegment& segment);
-  std::string telemetry_schema() const;
 
   McapFile file_;
   std::vector<RecordedSpan> spans_;

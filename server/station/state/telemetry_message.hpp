@@ -1,0 +1,53 @@
+// A sample as a message in JSON with its JSON Schema: the same in MCAP files and live for Foxglove.
+//
+//   span, boot_id, seq, robot_time_us, utc_us, the rows of kSampleFields, those of kBatchFields, clock_uncertainty_us,
+//   first_received_at_us, received_at_us, gap_before, gap_after, unknown_values
+//
+// A value that is none, or not finite, is left out; a number of a sample is the shortest decimal that gives the same
+// binary32 back. What a sample has only as part of a run (span, gap_before, gap_after) is missing in live messages. The
+// schema says of the position that it is believed, and which member is its ±. No errors.
+#pragma once
+
+#include <bitset>
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "server/station/state/telemetry_fields.hpp"
+
+namespace server::station {
+
+inline constexpr const char* kTelemetrySchemaName = "rheonaut.Telemetry";
+
+using ChosenFields = std::bitset<kSampleFieldCount>;  // of each sample, by the row of kSampleFields
+
+std::string telemetry_schema(const ChosenFields& chosen);
+
+struct ReceptionTimes {
+  std::int64_t clock_uncertainty_us = -1;                     // of utc_us; -1: no estimate yet
+  std::int64_t first_received_at_us = 0, received_at_us = 0;  // UTC, of the batch's first and last sample
+};
+
+struct SamplePlace {
+  std::uint64_t seq = 0, robot_time_us = 0;
+  std::int64_t utc_us = 0;
+};
+
+struct SampleGaps {
+  std::uint64_t before = 0, after = 0;  // samples that are missing there
+};
+
+// The messages of samples that share everything but their values; what they share is written once.
+class TelemetryMessages {
+ public:
+  TelemetryMessages(std::optional<std::uint32_t> span, std::uint64_t boot_id, const SampleContext& context,
+                    const ReceptionTimes& times, const ChosenFields& chosen);
+
+  void append(std::string& out, const SamplePlace& place, const Sample& sample, std::optional<SampleGaps> gaps) const;
+
+ private:
+  ChosenFields chosen_;
+  std::string beginning_, shared_, end_;
+};
+
+}  // namespace server::station
