@@ -39,6 +39,7 @@
 #include "server/cli/reference_pages.hpp"
 #include "server/cli/robots/stop.hpp"
 #include "server/cli/robots/watch.hpp"
+#include "server/cli/terminal/output.hpp"
 #include "server/config/config.hpp"
 
 namespace server::cli {
@@ -49,6 +50,7 @@ struct Serve {
 
 struct CheckConfig {
   config::ConfigFlags flags;
+  OutputForm form;
 };
 
 // The user was answered already (--help, --version, or a mistake that was explained).
