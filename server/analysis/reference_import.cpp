@@ -8,7 +8,10 @@
 #include <limits>
 #include <stdexcept>
 
+#include <nlohmann/json.hpp>
+
 #include "server/analysis/csv_columns.hpp"
+#include "server/analysis/optional_json.hpp"
 #include "server/analysis/reference_unit.hpp"
 #include "server/runtime/sha256.hpp"
 
@@ -367,6 +370,28 @@ std::string zero_in_words(const storage::OutsideReference& reference) {
   if (reference.zero_is_kept) return "zero kept as it was given";
   return fmt::format("zero by the robot's own record: {:.4f} m{} were added to each position", reference.zero_offset_m,
                      plus_minus(reference.zero_sd_m, 1e3, "mm"));
+}
+
+nlohmann::json json_of(const storage::OutsideReference& reference) {
+  nlohmann::json out;
+  out["run_id"] = reference.run;
+  out["span"] = reference.span;
+  out["source"] = reference.source;
+  out["sha256"] = reference.sha256;
+  out["clock_method"] = text(reference.clock);
+  out["clock_offset_s"] = reference.clock_offset_s;
+  out["clock_sd_s"] = or_null(reference.clock_sd_s);
+  out["correlation"] = or_null(reference.correlation);
+  out["motion_ratio"] = or_null(reference.motion_ratio);
+  out["zero_is_kept"] = reference.zero_is_kept;
+  out["zero_offset_m"] = reference.zero_offset_m;
+  out["zero_sd_m"] = or_null(reference.zero_sd_m);
+  out["samples"] = reference.samples;
+  out["samples_left_out"] = reference.samples_left_out;
+  out["actor"] = reference.actor;
+  out["made_at_us"] = reference.made_at_us;
+  out["in_words"] = clock_in_words(reference) + "; " + zero_in_words(reference);
+  return out;
 }
 
 }  // namespace server::analysis

@@ -9,6 +9,7 @@
 #pragma once
 
 #include <cstdint>
+#include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <span>
 #include <string>
@@ -72,5 +73,8 @@ Result<PlacedReference> place_reference(const ReferenceRequest& request, std::sp
 // What was done, in words: "clock by correlation (0.998) with the robot's own motion: ...".
 std::string clock_in_words(const storage::OutsideReference& reference);
 std::string zero_in_words(const storage::OutsideReference& reference);
+
+// As the API and the command line answer it.
+nlohmann::json json_of(const storage::OutsideReference& reference);
 
 }  // namespace server::analysis

@@ -6,6 +6,7 @@
 #include <filesystem>
 
 #include "server/cli/command_line.hpp"
+#include "server/config/station_document.hpp"
 
 namespace server::cli {
 namespace {
@@ -27,10 +28,46 @@ std::string protection(const config::Config& config, const std::string& listen) 
   return config.is_exposed(listen) ? "PLAIN on a reachable address" : "plain on loopback";
 }
 
+nlohmann::ordered_json port_json(const config::Config& config, const std::string& listen, bool or_any_port,
+                                 const config::PortPlaces& places) {
+  const bool is_tls = config.speaks_tls(listen);
+  return {{"listen", listen},
+          {"or_any_port", or_any_port},
+          {"max_connections", places.connections},
+          {"max_connections_of_address", places.of_address},
+          {"protection", is_tls                      ? "tls"
+                         : config.is_exposed(listen) ? "plain_on_reachable_address"
+                                                     : "plain_on_loopback"},
+          {"tls_certificate", is_tls ? nlohmann::ordered_json(config.tls_certificate().string()) : nullptr}};
+}
+
+nlohmann::ordered_json json_of(const config::Config& config) {
+  nlohmann::ordered_json of_fluid = nlohmann::ordered_json::object();
+  for (const auto& [fluid, limits] : config.envelope.of_fluid()) of_fluid[fluid] = limits_json(limits);
+  const config::RecordingConfig& recording = config.recording;
+  return {{"valid", true},
+          {"data", std::filesystem::absolute(config.data_dir).string()},
+          {"http", port_json(config, config.http, config.http_or_any_port, config.http_places)},
+          {"robots", port_json(config, config.robots, config.robots_or_any_port, config.robot_places)},
+          {"limits", limits_json(config.envelope.anywhere())},
+          {"limits_of_fluid", of_fluid},
+          {"limits_where_fluid_unknown", limits_json(config.envelope.strictest())},
+          {"recording",
+           {{"retention_days", recording.retention_days},
+            {"max_database_mb", recording.max_database_mb},
+            {"low_space_mb", recording.low_space_mb},
+            {"critical_space_mb", recording.critical_space_mb}}},
+          {"log", {{"level", config.log_level}, {"format", config.log_format}}}};
+}
+
 }  // namespace
 
 int run(const CheckConfig& line, std::ostream& out) {
   const config::Config config = load_config(line.flags);
+  if (line.form.is_json) {
+    write_json(out, json_of(config));
+    return 0;
+  }
   fmt::print(out, "data     {}\n", std::filesystem::absolute(config.data_dir).string());
   fmt::print(out, "http     {}{}\n", config.http, config.http_or_any_port ? " (or a free port)" : "");
   fmt::print(out, "robots   {}{}\n", config.robots, config.robots_or_any_port ? " (or a free port)" : "");

@@ -39,6 +39,7 @@ void add_options(CLI::App& command, Serve& line) {
 
 void add_options(CLI::App& command, CheckConfig& line) {
   add_options(command, line.flags);
+  add_json_flag(command, line.form);
   command.footer("Example: rheonaut check-config --data ~/lab");
 }
 

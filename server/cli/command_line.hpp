@@ -40,6 +40,7 @@
 #include "server/cli/reference_pages.hpp"
 #include "server/cli/robots/stop.hpp"
 #include "server/cli/robots/watch.hpp"
+#include "server/cli/terminal/output.hpp"
 #include "server/config/config.hpp"
 
 namespace server::cli {
@@ -50,6 +51,7 @@ struct Serve {
 
 struct CheckConfig {
   config::ConfigFlags flags;
+  OutputForm form;
 };
 
 // The user was answered already (--help, --version, or a mistake that was explained).

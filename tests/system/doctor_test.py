@@ -121,6 +121,35 @@ class DoctorTest(unittest.TestCase):
             finally:
                 place.station_process.send_signal(signal.SIGCONT)
 
+    def test_a_station_that_answers_its_health_and_nothing_else(self):
+        released = threading.Event()
+
+        class Busy(http.server.BaseHTTPRequestHandler):
+            def do_GET(self):
+                if self.path != "/healthz":
+                    released.wait(600)
+                self.send_response(200)
+                self.send_header("Content-Length", "0")
+                self.end_headers()
+
+            def log_message(self, *_):
+                pass
+
+        with self.stopped() as place, open(place.data / "rheonaut.lock") as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX)
+            server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), Busy)
+            server.daemon_threads = True
+            threading.Thread(target=server.serve_forever, daemon=True).start()
+            address = f"127.0.0.1:{server.server_port}"
+            (place.data / "endpoints.json").write_text(
+                json.dumps({"http": address, "robots": address, "pid": os.getpid()}))
+            try:
+                self.expect_note(place, "station", f"the station on {address} has not answered within 5 s")
+            finally:
+                released.set()
+                server.shutdown()
+                server.server_close()
+
     def test_a_station_of_another_version(self):
         class Old(http.server.BaseHTTPRequestHandler):
             def do_GET(self):
@@ -151,6 +180,11 @@ class DoctorTest(unittest.TestCase):
             for what in ("http", "robots"):
                 config = self.write_config(place, f"[{what}]\nlisten = \"127.0.0.1:{port}\"\n")
                 self.expect_problem(place, f"{what} port", f"(pid {os.getpid()}) listens on port {port}", "--config", config)
+            config = self.write_config(place, f"[http]\nlisten = \"127.0.0.2:{port}\"\n")
+            _, findings = doctor(place, "--config", config)
+            self.assertEqual([one["what"] for one in findings["http port"]], [f"127.0.0.2:{port} is free"])
+            config = self.write_config(place, f"[http]\nlisten = \"0.0.0.0:{port}\"\n")  # overlaps every address
+            self.expect_problem(place, "http port", f"listens on port {port}", "--config", config)
 
     def test_secrets_that_others_can_read(self):
         with self.stopped() as place:

@@ -52,8 +52,7 @@ asio::awaitable<Result<void>> write_by_child(ExportParts parts, storage::ExportO
   } catch (...) {
     failure = std::current_exception();
   }
-  auto end = [last = std::move(child)]() mutable { last.reset(); };
-  co_await parts.exports.reader().run(std::move(end));
+  co_await storage::end_export(parts.exports.reader(), std::move(child));
   if (failure) std::rethrow_exception(failure);
   co_return written;
 }

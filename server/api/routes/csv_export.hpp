@@ -41,6 +41,9 @@ class EndOnWorker {
     auto end = [whole = std::unique_ptr<T>{object}]() mutable { whole.reset(); };
     tasks_->spawn("end of an export", reader_->run(std::move(end)));
   }
+  void operator()(storage::ExportChild* child) const {
+    tasks_->spawn("end of an export", storage::end_export(*reader_, std::shared_ptr<storage::ExportChild>{child}));
+  }
 
  private:
   runtime::TaskGroup* tasks_;

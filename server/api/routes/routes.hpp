@@ -209,7 +209,6 @@ std::function<http::Answer(http::Request)> with(Parts parts, http::Answer (*answ
 
 std::string base_url(const StationFacts& facts, const std::string& address);  // "https://127.0.0.1:8080"
 std::string login_url(const std::string& base_url, const std::string& code);
-nlohmann::json to_json(const storage::OutsideReference& reference);
 nlohmann::json losses_json(const std::vector<storage::StoreLoss>& losses);
 
 // Who asks, and now.

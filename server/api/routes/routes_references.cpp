@@ -145,7 +145,7 @@ http::Answer import_reference(ReferenceRoutes parts, http::Request request) {
   placed->reference.made_at_us = by.at_us;
   const auto made = co_await references.import(std::move(placed->reference), std::move(placed->positions), reason, by);
   if (!made) co_return http::problem(made.error());
-  http::Response response = http::json_response(201, api::to_json(*made));
+  http::Response response = http::json_response(201, analysis::json_of(*made));
   response.headers.emplace_back("Location", fmt::format("/api/v1/runs/{}/reference", *run));
   co_return response;
 }
@@ -155,7 +155,7 @@ http::Answer get_reference(ReferenceRoutes parts, http::Request request) {
   if (!run) co_return http::problem(run.error());
   const auto found = co_await parts.references.find(*run);
   if (!found) co_return http::problem(found.error());
-  co_return http::json_response(200, api::to_json(*found));
+  co_return http::json_response(200, analysis::json_of(*found));
 }
 
 http::Answer remove_reference(ReferenceRoutes parts, http::Request request) {
@@ -165,7 +165,7 @@ http::Answer remove_reference(ReferenceRoutes parts, http::Request request) {
   if (!reason) co_return http::problem(reason.error());
   const auto removed = co_await parts.references.remove(*run, *reason, author_of(request, parts.clock));
   if (!removed) co_return http::problem(removed.error());
-  co_return http::json_response(200, api::to_json(*removed));
+  co_return http::json_response(200, analysis::json_of(*removed));
 }
 
 http::Answer list_positions(ReferenceRoutes parts, http::Request request) {
@@ -188,28 +188,6 @@ http::Answer list_positions(ReferenceRoutes parts, http::Request request) {
 }
 
 }  // namespace
-
-json to_json(const storage::OutsideReference& reference) {
-  json out;
-  out["run_id"] = reference.run;
-  out["span"] = reference.span;
-  out["source"] = reference.source;
-  out["sha256"] = reference.sha256;
-  out["clock_method"] = text(reference.clock);
-  out["clock_offset_s"] = reference.clock_offset_s;
-  out["clock_sd_s"] = number_or_null(reference.clock_sd_s);
-  out["correlation"] = number_or_null(reference.correlation);
-  out["motion_ratio"] = number_or_null(reference.motion_ratio);
-  out["zero_is_kept"] = reference.zero_is_kept;
-  out["zero_offset_m"] = reference.zero_offset_m;
-  out["zero_sd_m"] = number_or_null(reference.zero_sd_m);
-  out["samples"] = reference.samples;
-  out["samples_left_out"] = reference.samples_left_out;
-  out["actor"] = reference.actor;
-  out["made_at_us"] = reference.made_at_us;
-  out["in_words"] = analysis::clock_in_words(reference) + "; " + analysis::zero_in_words(reference);
-  return out;
-}
 
 void add_reference_routes(http::Router& router, ReferenceRoutes parts) {
   const auto add = [&router, parts](const char* method, const char* pattern, identity::Scope needs,

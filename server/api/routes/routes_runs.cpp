@@ -154,7 +154,7 @@ http::Answer get_step_metrics(RunRoutes parts, http::Request request) {
   json list = json::array();
   for (const analysis::MeasuredStep& step : measures->steps) list.push_back(analysis::json_of(step));
   json out{{"steps", std::move(list)}};
-  out["reference"] = measures->reference ? api::to_json(*measures->reference) : json(nullptr);
+  out["reference"] = measures->reference ? analysis::json_of(*measures->reference) : json(nullptr);
   out["estimate_error"] = analysis::json_of(measures->estimate_error);
   co_return http::json_response(200, out);
 }

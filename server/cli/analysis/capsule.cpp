@@ -20,13 +20,19 @@ void add_options(CLI::App& command, CapsuleQuestion& options) {
   command.add_option("--to", options.file, "The archive; one that is there is replaced")->required()->check(named());
   command.add_option("--data", options.data_dir, "Folder of the station (default: rheonaut-data)")->check(named());
   add_timeout_option(command, options.timeout_s);
+  add_json_flag(command, options.form);
   command.footer("Example: rheonaut capsule 1 --to run-1.eln --data lab");
 }
 
 int run(const CapsuleQuestion& options, std::ostream& out) {
   StationClient{options.data_dir}.save(fmt::format("/api/v1/runs/{}/capsule.eln", options.run), options.file,
                                        timeout(options.timeout_s));
-  fmt::print(out, "{} ({} bytes)\n", options.file.string(), std::filesystem::file_size(options.file));
+  const auto size_bytes = std::filesystem::file_size(options.file);
+  if (options.form.is_json) {
+    write_json(out, {{"run_id", options.run}, {"file", options.file.string()}, {"size_bytes", size_bytes}});
+  } else {
+    fmt::print(out, "{} ({} bytes)\n", options.file.string(), size_bytes);
+  }
   return 0;
 }
 

@@ -6,6 +6,7 @@
 #include <iosfwd>
 
 #include "server/cli/terminal/options.hpp"
+#include "server/cli/terminal/output.hpp"
 
 namespace CLI {
 class App;
@@ -18,6 +19,7 @@ struct CapsuleQuestion {
   double timeout_s = kLongAnswer_s;
   std::int64_t run = 0;
   std::filesystem::path file;
+  OutputForm form;
 };
 
 void add_options(CLI::App& command, CapsuleQuestion& options);

@@ -5,6 +5,7 @@
 #include <fmt/ostream.h>
 
 #include <CLI/CLI.hpp>
+#include <filesystem>
 #include <limits>
 
 #include "server/analysis/comparison/aligned_runs.hpp"
@@ -22,6 +23,7 @@ void add_options(CLI::App& command, ReportQuestion& options) {
   add_options(command, options.traces);
   command.add_option("--data", options.data_dir, "Folder of the station (default: rheonaut-data)")->check(named());
   add_timeout_option(command, options.timeout_s);
+  add_json_flag(command, options.form);
   command.footer(
       "The options of the alignment are those of several runs.\n"
       "Example: rheonaut report 1 2 3 --at step --to steps.html --data lab");
@@ -32,7 +34,13 @@ int run(const ReportQuestion& options, std::ostream& out) {
                                                       : fmt::format("/api/v1/run-comparison/report.html?{}",
                                                                     query_of(options.runs, options.traces));
   StationClient{options.data_dir}.save(target, options.file, timeout(options.timeout_s));
-  fmt::print(out, "{}\n", options.file.string());
+  if (options.form.is_json) {
+    write_json(out, {{"runs", options.runs},
+                     {"file", options.file.string()},
+                     {"size_bytes", std::filesystem::file_size(options.file)}});
+  } else {
+    fmt::print(out, "{}\n", options.file.string());
+  }
   return 0;
 }
 

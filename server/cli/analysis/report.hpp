@@ -8,6 +8,7 @@
 
 #include "server/cli/analysis/trace_options.hpp"
 #include "server/cli/terminal/options.hpp"
+#include "server/cli/terminal/output.hpp"
 
 namespace server::cli {
 
@@ -17,6 +18,7 @@ struct ReportQuestion {
   std::vector<std::int64_t> runs;
   TraceOptions traces;  // of several
   std::filesystem::path file;
+  OutputForm form;
 };
 
 void add_options(CLI::App& command, ReportQuestion& options);

@@ -72,6 +72,7 @@ void add_options(CLI::App& command, Backup& options) {
   command.add_option("--to", options.to, "The file to make; there is none of that name yet")
       ->check(named())
       ->required();
+  add_json_flag(command, options.form);
   command.footer("Example: rheonaut backup --data ~/lab --to /mnt/other-disk/lab-monday.sqlite");
 }
 
@@ -83,7 +84,11 @@ int run(const Backup& options, std::ostream& out) {
   } else {
     storage::move_finished(let_station_copy(StationClient{options.data_dir}), options.to);
   }
-  fmt::print(out, "{}: {} bytes, verified\n", options.to.string(), fs::file_size(options.to));
+  if (options.form.is_json) {
+    write_json(out, {{"file", options.to.string()}, {"size_bytes", fs::file_size(options.to)}, {"verified", true}});
+  } else {
+    fmt::print(out, "{}: {} bytes, verified\n", options.to.string(), fs::file_size(options.to));
+  }
   return 0;
 }
 

@@ -65,12 +65,12 @@ std::vector<std::string> names_of(const Certificate& options, const Files& files
 }
 
 // After a crash either nothing or both files of a pair are there; a key without certificate is used.
-void make_authority_unless_there(const Files& files, std::ostream& out) {
-  if (fs::exists(files.authority)) return;
+bool make_authority_unless_there(const Files& files) {
+  if (fs::exists(files.authority)) return false;
   const base::Openssl<EVP_PKEY> key = fs::exists(files.authority_key) ? tls::load_key(files.authority_key) : make_key();
   runtime::write_private(files.authority_key, key_pem(*key));
   runtime::write_private(files.authority, certificate_pem(*make_authority(*key)));
-  fmt::print(out, "made     {}, the authority of this lab\n", files.authority.string());
+  return true;
 }
 
 void check(const Certificate& options, const Files& files) {
@@ -85,7 +85,18 @@ void check(const Certificate& options, const Files& files) {
   if (options.new_key && !options.renew) throw UsageError{"--new-key goes with --renew"};
 }
 
-void print_what_to_do(const Files& files, const tls::TlsCertificate& made, std::ostream& out) {
+nlohmann::ordered_json json_of(const Files& files, const tls::TlsCertificate& made, bool is_authority_new) {
+  return {{"authority", fs::absolute(files.authority).string()},
+          {"authority_is_new", is_authority_new},
+          {"certificate", fs::absolute(files.certificate).string()},
+          {"names", made.names},
+          {"not_after_us", made.not_after_us},
+          {"pin", made.pin},
+          {"public_key_pem", made.public_key_pem}};
+}
+
+void print_what_to_do(const Files& files, const tls::TlsCertificate& made, bool is_authority_new, std::ostream& out) {
+  if (is_authority_new) fmt::print(out, "made     {}, the authority of this lab\n", files.authority.string());
   fmt::print(out, "made     {}\n", files.certificate.string());
   fmt::print(out, "names    {}\n", fmt::join(made.names, ", "));
   fmt::print(out, "until    {:%Y-%m-%d}\n", fmt::gmtime(static_cast<std::time_t>(made.not_after_us / 1'000'000)));
@@ -110,6 +121,7 @@ void add_options(CLI::App& command, Certificate& options) {
   command.add_flag("--renew", options.renew, "Make a new one though there is one, with the same key and names");
   command.add_flag("--new-key", options.new_key, "... with another key: everyone who pinned the old one must be told");
   command.add_option("--days", options.days, "How long it is good for (default: 825)")->check(whole(1, kMaxDays));
+  add_json_flag(command, options.form);
   command.footer("Example: rheonaut certificate --data ~/lab --name lab-pc.local --name 192.168.1.20");
 }
 
@@ -119,7 +131,7 @@ int run(const Certificate& options, std::ostream& out) {
   config::make_data_folder(options.data_dir);
   config::make_data_folder(files.folder);
   const std::vector<std::string> names = names_of(options, files);
-  make_authority_unless_there(files, out);
+  const bool is_authority_new = make_authority_unless_there(files);
   const bool keeps_key = fs::exists(files.key) && !options.new_key;
   const base::Openssl<EVP_PKEY> key = keeps_key ? tls::load_key(files.key) : make_key();
   const base::Openssl<X509> authority = tls::load_certificate(files.authority);
@@ -127,7 +139,11 @@ int run(const Certificate& options, std::ostream& out) {
   const base::Openssl<X509> made = make_certificate(*key, names, options.days, *authority, *authority_key);
   if (!keeps_key) runtime::write_private(files.key, key_pem(*key));
   runtime::write_private(files.certificate, certificate_pem(*made));
-  print_what_to_do(files, tls::describe(*made), out);
+  if (options.form.is_json) {
+    write_json(out, json_of(files, tls::describe(*made), is_authority_new));
+  } else {
+    print_what_to_do(files, tls::describe(*made), is_authority_new, out);
+  }
   return 0;
 }
 

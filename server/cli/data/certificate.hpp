@@ -9,6 +9,8 @@
 #include <string>
 #include <vector>
 
+#include "server/cli/terminal/output.hpp"
+
 namespace CLI {
 class App;
 }
@@ -21,6 +23,7 @@ struct Certificate {
   bool renew = false;
   bool new_key = false;
   int days = 825;  // of the station's certificate; more is refused by some browsers
+  OutputForm form;
 };
 
 void add_options(CLI::App& command, Certificate& options);

@@ -70,6 +70,7 @@ void add_options(CLI::App& command, Export& options) {
       ->check(named());
   command.add_option("--data", options.data_dir, "Folder of the station that recorded it (default: rheonaut-data)")
       ->check(named());
+  add_json_flag(command, options.form);
   command.footer("Example: rheonaut export --run 1 --format mat --to run-1.mat --data ~/lab");
 }
 
@@ -84,8 +85,15 @@ int run(const Export& options, std::ostream& out) {
   PartFile part{options.to};
   write({options.data_dir / "station.sqlite", options.format, query, part.path()});
   part.keep();
-  out << fmt::format("run {}: {} ({} bytes)\n", options.run, options.to.string(),
-                     std::filesystem::file_size(options.to));
+  const auto size_bytes = std::filesystem::file_size(options.to);
+  if (options.form.is_json) {
+    write_json(out, {{"run_id", options.run},
+                     {"format", text(options.format)},
+                     {"file", options.to.string()},
+                     {"size_bytes", size_bytes}});
+  } else {
+    out << fmt::format("run {}: {} ({} bytes)\n", options.run, options.to.string(), size_bytes);
+  }
   return 0;
 }
 

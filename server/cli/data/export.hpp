@@ -7,6 +7,7 @@
 #include <optional>
 #include <string>
 
+#include "server/cli/terminal/output.hpp"
 #include "server/storage/export/export_format.hpp"
 
 namespace CLI {
@@ -24,6 +25,7 @@ struct Export {
   std::filesystem::path data_dir = "rheonaut-data";
   std::optional<std::int64_t> grid_us;
   std::string channels;  // empty: all
+  OutputForm form;
 };
 
 void add_options(CLI::App& command, Export& options);

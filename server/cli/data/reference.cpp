@@ -186,7 +186,11 @@ storage::StoredReference read_stored(const ReferenceCommand& options, bool with_
   return stored;
 }
 
-void write(const storage::OutsideReference& reference, std::ostream& out) {
+void write(const ReferenceCommand& options, const storage::OutsideReference& reference, std::ostream& out) {
+  if (options.form.is_json) {
+    write_json(out, analysis::json_of(reference));
+    return;
+  }
   fmt::print(out, "run {}: {} positions of {}{}\n{}\n{}\n", reference.run, reference.samples, reference.source,
              reference.samples_left_out == 0
                  ? std::string{}
@@ -197,11 +201,11 @@ void write(const storage::OutsideReference& reference, std::ostream& out) {
 void import_one(const ReferenceCommand& options, std::ostream& out) {
   const analysis::ReferenceRequest request = request_of(options);
   if (const auto lock = config::FolderLock::try_take(options.data_dir)) {
-    write(import_closed(options, request), out);
+    write(options, import_closed(options, request), out);
     return;
   }
   ask_station(options, "", json_of(request));
-  write(read_stored(options, false).reference, out);
+  write(options, read_stored(options, false).reference, out);
 }
 
 void remove_one(const ReferenceCommand& options, std::ostream& out) {
@@ -212,7 +216,11 @@ void remove_one(const ReferenceCommand& options, std::ostream& out) {
   } else {
     ask_station(options, "/remove", {{"reason", options.reason}});
   }
-  fmt::print(out, "run {} has no reference any more\n", options.run);
+  if (options.form.is_json) {
+    write_json(out, {{"run_id", options.run}, {"reference", nullptr}});
+  } else {
+    fmt::print(out, "run {} has no reference any more\n", options.run);
+  }
 }
 
 void export_csv(const ReferenceCommand& options, std::ostream& out) {
@@ -230,6 +238,7 @@ void export_csv(const ReferenceCommand& options, std::ostream& out) {
 void add_options(CLI::App& command, ReferenceCommand& options) {
   command.require_subcommand(1);
   auto* importing = offer(command, options, Act::import, "import", "Put a position measured from outside beside a run");
+  add_json_flag(*importing, options.form);
   importing->add_option("--csv", options.csv_file, "Its columns: t_s, position_m and, if it has one, position_sd_m")
       ->required()
       ->check(named());
@@ -246,12 +255,13 @@ void add_options(CLI::App& command, ReferenceCommand& options) {
   importing->footer(
       "Without --offset-s, --utc-s or --marker the clock is found by correlation with the robot's own motion.\n"
       "Example: rheonaut reference import --run 1 --csv camera.csv --sd-mm 0.5 --data lab");
-  offer(command, options, Act::show, "show", "Say what was imported, and how its clock and zero were found");
+  add_json_flag(
+      *offer(command, options, Act::show, "show", "Say what was imported, and how its clock and zero were found"),
+      options.form);
   offer(command, options, Act::export_positions, "export", "Write its positions as CSV, on the robot's clock");
-  offer(command, options, Act::remove, "remove", "Remove it")
-      ->add_option("--reason", options.reason, "Why")
-      ->required()
-      ->check(named());
+  auto* removing = offer(command, options, Act::remove, "remove", "Remove it");
+  removing->add_option("--reason", options.reason, "Why")->required()->check(named());
+  add_json_flag(*removing, options.form);
   command.footer("Example: rheonaut reference show --run 1 --data lab");
 }
 
@@ -260,7 +270,7 @@ int run(const ReferenceCommand& options, std::ostream& out) {
   if (!fs::exists(database)) throw std::runtime_error{fmt::format("there is no '{}'", database.string())};
   switch (options.act) {
     case Act::import: import_one(options, out); break;
-    case Act::show: write(read_stored(options, false).reference, out); break;
+    case Act::show: write(options, read_stored(options, false).reference, out); break;
     case Act::export_positions: export_csv(options, out); break;
     case Act::remove: remove_one(options, out); break;
   }

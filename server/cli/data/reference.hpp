@@ -11,6 +11,7 @@
 
 #include "server/analysis/reference_import.hpp"
 #include "server/cli/terminal/options.hpp"
+#include "server/cli/terminal/output.hpp"
 
 namespace CLI {
 class App;
@@ -22,6 +23,7 @@ struct ReferenceCommand {
   enum class Act : std::uint8_t { import, show, export_positions, remove };
   Act act = Act::show;
   std::filesystem::path data_dir = "rheonaut-data";
+  OutputForm form;
   double timeout_s = kLongAnswer_s;
   storage::RunId run = 0;
   std::string csv_file;

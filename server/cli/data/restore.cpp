@@ -18,6 +18,7 @@ void add_options(CLI::App& command, Restore& options) {
   command.add_option("--from", options.from, "The backup")->check(named())->required();
   command.add_option("--data", options.data_dir, "Folder of the station; made when missing (default: rheonaut-data)")
       ->check(named());
+  add_json_flag(command, options.form);
   command.footer("Example: rheonaut restore --from /mnt/other-disk/lab-monday.sqlite --data ~/lab-restored");
 }
 
@@ -29,9 +30,17 @@ int run(const Restore& options, std::ostream& out) {
   }
   const storage::RestoredStore restored =
       storage::restore_database(options.from, options.data_dir, command_line_author());
+  const std::filesystem::path database = options.data_dir / "station.sqlite";
+  if (options.form.is_json) {
+    write_json(out, {{"database", database.string()},
+                     {"samples", restored.samples},
+                     {"runs", restored.runs},
+                     {"runs_interrupted", restored.runs_interrupted},
+                     {"verified", true}});
+    return 0;
+  }
   fmt::print(out, "{}: {} samples and {} runs, verified; {} of the runs were open and are interrupted\n",
-             (options.data_dir / "station.sqlite").string(), restored.samples, restored.runs,
-             restored.runs_interrupted);
+             database.string(), restored.samples, restored.runs, restored.runs_interrupted);
   return 0;
 }
 

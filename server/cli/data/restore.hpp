@@ -4,6 +4,8 @@
 #include <filesystem>
 #include <iosfwd>
 
+#include "server/cli/terminal/output.hpp"
+
 namespace CLI {
 class App;
 }
@@ -13,6 +15,7 @@ namespace server::cli {
 struct Restore {
   std::filesystem::path from;
   std::filesystem::path data_dir = "rheonaut-data";
+  OutputForm form;
 };
 
 void add_options(CLI::App& command, Restore& options);

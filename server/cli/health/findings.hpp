@@ -42,6 +42,8 @@ class Findings {
     add({Grade::problem, std::move(topic), std::move(what), std::move(action)});
   }
 
+  void append(const Findings& others) { all_.insert(all_.end(), others.all_.begin(), others.all_.end()); }
+
   const std::vector<Finding>& all() const { return all_; }
   std::size_t problems() const {
     return static_cast<std::size_t>(std::ranges::count(all_, Grade::problem, &Finding::grade));

@@ -4,25 +4,47 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cctype>
+#include <cstdint>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <sstream>
 
 namespace server::cli {
 namespace fs = std::filesystem;
+namespace asio = boost::asio;
 
 namespace {
 
+// "0100007F": 32 bits at a time, each as this machine reads them.
+asio::ip::address address_of(const std::string& digits) {
+  std::array<unsigned char, 16> bytes{};
+  for (std::size_t at = 0; 8 * (at + 1) <= digits.size() && at < 4; ++at) {
+    const auto word = static_cast<std::uint32_t>(std::stoul(digits.substr(8 * at, 8), nullptr, 16));
+    std::memcpy(&bytes[4 * at], &word, sizeof word);
+  }
+  if (digits.size() == 8) return asio::ip::address_v4{{bytes[0], bytes[1], bytes[2], bytes[3]}};
+  const asio::ip::address_v6 address{bytes};
+  if (address.is_v4_mapped()) return asio::ip::make_address_v4(asio::ip::v4_mapped, address);
+  return address;
+}
+
+bool overlap(const asio::ip::address& one, const asio::ip::address& other) {
+  return one == other || one.is_unspecified() || other.is_unspecified();
+}
+
 // Lines of /proc/net/tcp: "0: 0100007F:1F90 00000000:0000 0A … inode": local address in hexadecimal, state 0A listens.
-std::string inode_of_listener(const char* table, int port) {
+std::string inode_of_listener(const char* table, const asio::ip::tcp::endpoint& endpoint) {
   std::ifstream in{table};
-  const std::string wanted = fmt::format(":{:04X}", port);
+  const std::string wanted = fmt::format(":{:04X}", endpoint.port());
   for (std::string line; std::getline(in, line);) {
     std::istringstream words{line};
     std::string number, local, remote, state, queues, timer, retransmits, uid, timeout, inode;
     words >> number >> local >> remote >> state >> queues >> timer >> retransmits >> uid >> timeout >> inode;
-    if (local.ends_with(wanted) && state == "0A") return inode;
+    if (!local.ends_with(wanted) || state != "0A") continue;
+    if (overlap(address_of(local.substr(0, local.find(':'))), endpoint.address())) return inode;
   }
   return "";
 }
@@ -38,9 +60,9 @@ bool has_open(const fs::path& process, const std::string& socket) {
 
 }  // namespace
 
-std::optional<ListeningProgram> find_listening_program(int port) {
-  std::string inode = inode_of_listener("/proc/net/tcp", port);
-  if (inode.empty()) inode = inode_of_listener("/proc/net/tcp6", port);
+std::optional<ListeningProgram> find_listening_program(const asio::ip::tcp::endpoint& endpoint) {
+  std::string inode = inode_of_listener("/proc/net/tcp", endpoint);
+  if (inode.empty()) inode = inode_of_listener("/proc/net/tcp6", endpoint);
   if (inode.empty()) return std::nullopt;
   std::error_code error;
   for (fs::directory_iterator at{"/proc", error}, end; !error && at != end; at.increment(error)) {

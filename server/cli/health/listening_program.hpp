@@ -1,6 +1,7 @@
-// Which program listens on a TCP port of this machine, as /proc tells.
+// Which program listens on an address of this machine, as /proc tells.
 #pragma once
 
+#include <boost/asio/ip/tcp.hpp>
 #include <optional>
 #include <string>
 
@@ -11,7 +12,8 @@ struct ListeningProgram {
   std::string name;
 };
 
-// None: nobody listens there, on any address.
-std::optional<ListeningProgram> find_listening_program(int port);
+// Who keeps others from listening there: on this address, or on every address; for the unspecified address, on any.
+// None: nobody.
+std::optional<ListeningProgram> find_listening_program(const boost::asio::ip::tcp::endpoint& endpoint);
 
 }  // namespace server::cli

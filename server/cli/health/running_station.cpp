@@ -61,24 +61,28 @@ void read_announcement(const std::filesystem::path& file, RunningStation& runnin
 void ask(const std::filesystem::path& data_dir, RunningStation& running) {
   try {
     const StationClient client{data_dir};
-    running.station = asked(client.ask("GET", "/api/v1/station"));
-    running.recording = asked(client.ask("GET", "/api/v1/recording"));
-    running.robot_list = asked(client.ask("GET", "/api/v1/robots"));
+    const auto answer_to = [&client](const char* target) {
+      return asked(client.ask("GET", target, nullptr, {std::chrono::seconds{kPatience.tv_sec}}));
+    };
+    running.station = answer_to("/api/v1/station");
+    running.recording = answer_to("/api/v1/recording");
+    running.robot_list = answer_to("/api/v1/robots");
   } catch (const std::exception& error) {  // not our token, or it has just ended
     running.problem = error.what();
   }
 }
 
-std::string named_program(int port) {
-  const std::optional<ListeningProgram> program = find_listening_program(port);
+std::string named_program(const tcp::endpoint& endpoint) {
+  const std::optional<ListeningProgram> program = find_listening_program(endpoint);
   if (!program) return "";
   return program->pid == 0 ? "a program of another user" : fmt::format("{} (pid {})", program->name, program->pid);
 }
 
 void check_port(const std::string& what, const std::string& address, bool runs, bool or_any_port, Findings& findings) {
-  const int port = config::parse_endpoint(address).port();
+  const tcp::endpoint endpoint = config::parse_endpoint(address);
+  const int port = endpoint.port();
   const std::string topic = what + " port";
-  const std::string program = port == 0 ? "" : named_program(port);
+  const std::string program = port == 0 ? "" : named_program(endpoint);
   if (port == 0) return findings.fine(topic, fmt::format("{}: any free port is taken at the start", address));
   if (runs && program.empty()) {
     return findings.problem(topic, fmt::format("nothing listens on {}, which the station has announced", address),

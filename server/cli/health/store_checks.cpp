@@ -181,27 +181,33 @@ std::int64_t check_database(const fs::path& path, Findings& findings) {
   }
   check_losses(path, findings);
   std::int64_t latest_us = 0;
+  Findings of_pages;
   auto read = [&](SQLite::Database& database, const std::string&) -> Result<void> {
-    latest_us = check_pages(database, path, findings);
+    of_pages = {};  // read again when a station has begun to write meanwhile
+    latest_us = check_pages(database, path, of_pages);
     return {};
   };
   const auto done = storage::read_store(path, read);
+  findings.append(of_pages);
   if (!done) findings.problem("database", one_line(done.error().detail), kVerify);
   return latest_us;
 }
 
 void check_robots(const fs::path& path, const RunningStation& running, std::int64_t now_us, Findings& findings) {
+  Findings of_robots;
   auto read = [&](SQLite::Database& database, const std::string&) -> Result<void> {
+    of_robots = {};  // read again when a station has begun to write meanwhile
     if (database.execAndGet("PRAGMA user_version").getInt64() < newest_version()) return {};
     const auto firmware = firmware_in_use(database);
     std::size_t known = 0;
     for (const auto& [version, ids] : firmware) known += ids.size();
-    judge_robots(known, running, findings);
-    if (known > 0) judge_firmware(firmware, findings);
-    check_refusals(database, now_us, findings);
+    judge_robots(known, running, of_robots);
+    if (known > 0) judge_firmware(firmware, of_robots);
+    check_refusals(database, now_us, of_robots);
     return {};
   };
   if (fs::exists(path)) static_cast<void>(storage::read_store(path, read));  // check_database has said what is wrong
+  findings.append(of_robots);
 }
 
 }  // namespace server::cli

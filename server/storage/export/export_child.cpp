@@ -91,7 +91,11 @@ Result<fs::path> find_export_program() {
 ExportChild::ExportChild(ExportOrder order, ExportLimits limits)
     : order_{std::move(order)}, limits_{std::move(limits)} {}
 
-ExportChild::~ExportChild() { kill_and_reap(); }
+ExportChild::~ExportChild() {
+  for (const auto end_at = std::chrono::steady_clock::now() + kMostTimeToDie; !end();) {
+    if (std::chrono::steady_clock::now() >= end_at) return;
+  }
+}
 
 Result<bool> ExportChild::advance() {
   if (pid_ < 0) {
@@ -108,7 +112,7 @@ Result<bool> ExportChild::advance() {
   if (!is_open) return broken_off(end_text());
   const auto silent = std::chrono::steady_clock::now() - last_line_;
   if (silent < limits_.most_silent) return true;
-  kill_and_reap();
+  kill();
   return fail(
       ErrorCode::unavailable,
       fmt::format("the export of run {} made no progress for {:.3g} s and was ended; is the station's disk "
@@ -156,7 +160,7 @@ std::optional<ExportLine> ExportChild::next_line() {
 }
 
 Result<bool> ExportChild::finish(const ExportLine& last) {
-  kill_and_reap();
+  kill();
   if (const auto* error = std::get_if<Error>(&last)) return std::unexpected{*error};
   progress_.passed = progress_.total;
   return false;
@@ -184,18 +188,34 @@ std::string ExportChild::end_text() const {
   return "closed its output before the file was whole";
 }
 
-// SAFETY: nothing of a child is left behind: not the process, not its entry, not the pipe.
-void ExportChild::kill_and_reap() {
+void ExportChild::kill() {
   if (pipe_ >= 0) ::close(pipe_);
   pipe_ = -1;
-  if (pid_ < 0) return;
-  ::kill(pid_, SIGKILL);
-  // A process that waits for a disk dies when the disk answers: then its entry is left.
-  for (const auto end = std::chrono::steady_clock::now() + kMostTimeToDie; std::chrono::steady_clock::now() < end;) {
-    if (::waitpid(pid_, nullptr, WNOHANG) != 0) break;  // it was reaped, or is no child any more
+  if (pid_ >= 0) ::kill(pid_, SIGKILL);
+}
+
+bool ExportChild::is_reaped() {
+  if (pid_ < 0) return true;
+  if (::waitpid(pid_, nullptr, WNOHANG) == 0) return false;
+  pid_ = -1;  // it was reaped, or is no child any more
+  return true;
+}
+
+// SAFETY: nothing of a child is left behind: not the process, not its entry, not the pipe.
+bool ExportChild::end() {
+  kill();
+  for (const auto end_at = std::chrono::steady_clock::now() + kSlice; !is_reaped();) {
+    if (std::chrono::steady_clock::now() >= end_at) return false;
     ::poll(nullptr, 0, 1);
   }
-  pid_ = -1;
+  return true;
+}
+
+boost::asio::awaitable<void> end_export(DatabaseReader& reader, std::shared_ptr<ExportChild> child) {
+  for (bool is_gone = false; !is_gone;) {
+    auto slice = [child] { return child->end(); };
+    is_gone = co_await reader.run(std::move(slice));
+  }
 }
 
 }  // namespace server::storage

@@ -13,8 +13,6 @@ ROOT = pathlib.Path(__file__).parents[3]
 BIN = pathlib.Path(os.environ["RHEONAUT_BIN"])
 # What prints no result for people: a program that runs on, scripts and pages, documents that are JSON or CSV already.
 WITHOUT_JSON = {"serve", "demo", "support-bundle", "completion", "man", "design show", "design export", "reference export"}
-JSON_IS_MISSING = {"check-config", "certificate", "backup", "restore", "report", "capsule", "export", "reference import",
-                   "reference show", "reference remove"}  # known, and no others
 ROFF_REQUESTS = {"TH", "SH", "SS", "TP", "PP", "EX", "EE"}
 
 
@@ -87,14 +85,29 @@ class CommandLineTest(unittest.TestCase):
     def test_every_command_answers_in_json(self):
         without = {" ".join(command.words) for command in COMMANDS
                    if not command.commands and "--json" not in command.options}
-        self.assertEqual(without, WITHOUT_JSON | JSON_IS_MISSING)
+        self.assertEqual(without, WITHOUT_JSON)
         with tempfile.TemporaryDirectory() as folder:
+            copy, restored = f"{folder}/copy.sqlite", f"{folder}/restored"
             for words in (["token", "create", "a"], ["token", "revoke", "a"], ["robot", "enroll", "r"],
-                          ["robot", "retire", "r"], ["robot", "list"], ["user", "list"], ["bode"], ["profile"]):
-                data = [] if words[0] in ("bode", "profile") else ["--data", folder]
+                          ["robot", "retire", "r"], ["robot", "list"], ["user", "list"], ["bode"], ["profile"],
+                          ["check-config"], ["certificate"], ["backup", "--to", copy],
+                          ["restore", "--from", copy, "--data", restored]):
+                data = [] if words[0] in ("bode", "profile") or "--data" in words else ["--data", folder]
                 done = run(*words, "--json", *data)
                 self.assertEqual((done.returncode, done.stderr), (0, ""), words)
-                json.loads(done.stdout)
+                said = json.loads(done.stdout)
+                if words[0] == "backup":
+                    self.assertEqual(said, {"file": copy, "size_bytes": os.path.getsize(copy), "verified": True})
+            # An error is the same as without --json: a line on standard error, and nothing on standard output.
+            for words in (["certificate"], ["backup", "--to", copy], ["restore", "--from", copy, "--data", restored],
+                          ["export", "--run", "1", "--format", "csv", "--to", f"{folder}/run.csv"],
+                          ["reference", "show", "--run", "1"], ["reference", "remove", "--run", "1", "--reason", "a"],
+                          ["report", "1", "--to", f"{folder}/run.html"], ["capsule", "1", "--to", f"{folder}/run.eln"],
+                          ["check-config", "--config", f"{folder}/none.toml"]):
+                data = [] if "--data" in words else ["--data", folder]
+                done, plain = run(*words, "--json", *data), run(*words, *data)
+                self.assertEqual((done.returncode, done.stdout, done.stderr), (1, "", plain.stderr), words)
+                self.assertRegex(done.stderr, r"^rheonaut: [^\n]+\n$")
 
     def test_a_mistake_is_exit_status_2_with_a_suggestion(self):
         for command in COMMANDS:

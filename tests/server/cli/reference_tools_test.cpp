@@ -80,6 +80,10 @@ TEST_F(ReferenceTools, ImportFindsTheClockAndIdentifyPrefersWhatWasMeasured) {
   EXPECT_THAT(made.text, AllOf(HasSubstr("positions of camera.csv"), HasSubstr("clock by correlation"),
                                HasSubstr("plus -3.45"), HasSubstr("zero by the robot's own record")));
   EXPECT_EQ(ask("reference show --run 1").text, made.text);
+  const auto shown = ask("reference show --run 1 --json").json();
+  EXPECT_EQ(shown["run_id"], 1);
+  EXPECT_EQ(shown["source"], "camera.csv");
+  EXPECT_EQ(shown["clock_method"], "correlation");
 
   const ToolAnswer fitted = ask("identify --run 1 --structure second_order");
   EXPECT_THAT(fitted.text,
@@ -155,7 +159,9 @@ TEST_F(ReferenceTools, PositionsThatLookLikeCentimetresNeedTheWordThatTheyAreNot
   out.close();
   const std::string import = "reference import --run 1 --csv @far.csv --sd-mm 50 --offset-s -3.4567";
   EXPECT_THAT(ask(import).error, AllOf(HasSubstr("they look like centimetres"), HasSubstr("--metres")));
-  EXPECT_EQ(ask(import + " --metres").exit_code, 0);
+  EXPECT_EQ(ask(import + " --metres --json").json()["clock_offset_s"], -3.4567);
+  const auto removed = ask("reference remove --run 1 --reason test --json").json();
+  EXPECT_EQ(removed, nlohmann::json::parse(R"({"run_id":1,"reference":null})"));
 }
 
 TEST_F(ReferenceTools, AGivenClockIsTakenAtItsWord) {

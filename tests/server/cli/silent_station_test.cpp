@@ -127,10 +127,20 @@ TEST_F(SilentStationTest, AFileThatComesSlowlyIsWhole) {
   answer.exit_code = 1;
   for (int attempt = 0; attempt < 3 && answer.exit_code != 0; ++attempt) {
     const SilentStation station{folder_ / "data", pieces, 400ms};
-    answer = ask("report 1 --to @run-1.html --timeout-s 2 --data @data");
+    answer = ask("report 1 --to @run-1.html --timeout-s 2 --json --data @data");
   }
   EXPECT_EQ(answer.exit_code, 0) << answer.error;
   EXPECT_EQ(std::filesystem::file_size(folder_ / "run-1.html"), 60u);
+  const nlohmann::json said{{"runs", {1}}, {"file", (folder_ / "run-1.html").string()}, {"size_bytes", 60}};
+  EXPECT_EQ(answer.json(), said);
+}
+
+TEST_F(SilentStationTest, AnArchiveIsNamedInJson) {
+  const SilentStation station{folder_ / "data", {head("application/zip", 4) + "abcd"}};
+  const Answer answer = ask("capsule 7 --to @run-7.eln --json --data @data");
+  ASSERT_EQ(answer.exit_code, 0) << answer.error;
+  const nlohmann::json said{{"run_id", 7}, {"file", (folder_ / "run-7.eln").string()}, {"size_bytes", 4}};
+  EXPECT_EQ(answer.json(), said);
 }
 
 }  // namespace

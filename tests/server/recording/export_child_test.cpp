@@ -1,13 +1,18 @@
 // The program that writes export files, as the station follows it: scripts that break stand in for it here.
 #include <fcntl.h>
 #include <gtest/gtest.h>
+#include <sched.h>
 #include <signal.h>
 #include <stdlib.h>
+#include <sys/ptrace.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <boost/asio/co_spawn.hpp>
 #include <fstream>
+#include <stdexcept>
 
+#include "server/runtime/tasks.hpp"
 #include "server/storage/export/export_child.hpp"
 
 namespace server {
@@ -94,9 +99,11 @@ class ExportChildTest : public ::testing::Test {
 };
 
 TEST_F(ExportChildTest, ItsProgressAndItsEndAreFollowed) {
-  storage::ExportChild child{order(), script("echo progress 5 10; echo done")};
-  EXPECT_FALSE(follow(child).value());
-  EXPECT_DOUBLE_EQ(child.progress().share(), 1);
+  {
+    storage::ExportChild child{order(), script("echo progress 5 10; echo done")};
+    EXPECT_FALSE(follow(child).value());
+    EXPECT_DOUBLE_EQ(child.progress().share(), 1);
+  }
   EXPECT_FALSE(has_children());
 }
 
@@ -154,23 +161,104 @@ TEST_F(ExportChildTest, ItEndsWithTheObjectThatFollowsIt) {
   EXPECT_FALSE(has_children());
 }
 
-// No socket of the station's stays open in it, and signals that the station ignores are as usual there.
+// Keeps a child of this program from being reaped after its death, as the kernel does while a disk does not answer: it
+// traces it.
+class SlowDeath {
+ public:
+  explicit SlowDeath(pid_t victim) {
+    int ends[2];
+    if (::pipe(ends) != 0) throw std::runtime_error{"no pipe"};
+    tracer_ = ::fork();
+    if (tracer_ == 0) {
+      const char is_traced = ::ptrace(PTRACE_SEIZE, victim, nullptr, nullptr) == 0 ? 1 : 0;
+      if (::write(ends[1], &is_traced, 1) != 1) ::_exit(1);
+      for (;;) ::pause();
+    }
+    char is_traced = 0;
+    if (::read(ends[0], &is_traced, 1) != 1 || is_traced == 0) {
+      over();
+      throw std::runtime_error{"this machine lets no program trace another of its user (kernel.yama.ptrace_scope)"};
+    }
+    ::close(ends[0]), ::close(ends[1]);
+  }
+  ~SlowDeath() { over(); }
+  SlowDeath(const SlowDeath&) = delete;
+  SlowDeath& operator=(const SlowDeath&) = delete;
+
+  void over() {
+    if (tracer_ < 0) return;
+    ::kill(tracer_, SIGKILL);
+    ::waitpid(tracer_, nullptr, 0);
+    tracer_ = -1;
+  }
+
+ private:
+  pid_t tracer_ = -1;
+};
+
+// SAFETY: no thread waits for such a program for longer than a slice, and it is reaped however late it dies.
+TEST_F(ExportChildTest, OneThatDiesLateBlocksNoThreadAndIsReaped) {
+  boost::asio::io_context loop;
+  runtime::WorkerThread worker{"exports"};
+  storage::DatabaseReader reader{folder_ / "station.sqlite", worker};
+  auto child = std::make_shared<storage::ExportChild>(order(), script("echo progress $$ $$; exec sleep 600"));
+  pid_t pid = 0;
+  auto start = [&] {
+    for (; pid == 0; pid = static_cast<pid_t>(child->progress().total)) child->advance().value();
+    return true;
+  };
+  ASSERT_TRUE(runtime::run_first(loop, reader.run(start)));
+  SlowDeath death{pid};
+  int slices_of_others = 0;
+  bool has_ended = false;
+  boost::asio::co_spawn(loop, storage::end_export(reader, std::move(child)),
+                        [&](const std::exception_ptr&) { has_ended = true; });
+  auto nothing = [] { return true; };
+  const auto look = [&](const auto& again, int most) -> void {
+    boost::asio::co_spawn(loop, reader.run(nothing), [&, most](const std::exception_ptr&, bool) {
+      ++slices_of_others;
+      if (most > 1) again(again, most - 1);
+    });
+  };
+  look(look, 300);  // of 10 ms each: longer than any wait for its death that would block
+  while (slices_of_others < 300) ASSERT_GT(loop.run_one_for(30s), 0u);
+  EXPECT_FALSE(has_ended);
+  siginfo_t found{};
+  EXPECT_EQ(::waitid(P_PID, static_cast<id_t>(pid), &found, WEXITED | WNOHANG | WNOWAIT), 0) << "it is still there";
+  death.over();
+  while (!has_ended) ASSERT_GT(loop.run_one_for(30s), 0u);
+  EXPECT_FALSE(has_children());
+}
+
+// No socket of the station's stays open in it; signals that the station ignores or blocks, and the scheduling of its
+// threads, are as usual there.
 TEST_F(ExportChildTest, ItInheritsNothing) {
   const int open = ::open("/dev/null", O_RDONLY);
   ASSERT_EQ(::dup2(open, 57), 57);  // not closed by exec
   ::signal(SIGPIPE, SIG_IGN);
+  sigset_t blocked{}, before{};
+  ::sigemptyset(&blocked), ::sigaddset(&blocked, SIGUSR1);
+  ::pthread_sigmask(SIG_BLOCK, &blocked, &before);
+  const sched_param usual{};
+  ASSERT_EQ(::sched_setscheduler(0, SCHED_BATCH, &usual), 0);
   const auto file = folder_ / "seen";
   storage::ExportChild child{
-      order(), script("ls /proc/self/fd > " + file.string() + "; grep SigIgn /proc/self/status >> " + file.string() +
+      order(), script("ls /proc/self/fd > " + file.string() + "; grep Sig /proc/self/status >> " + file.string() +
+                      "; awk '{print \"policy\", $41}' /proc/self/stat >> " + file.string() +
                       "; readlink /proc/self/fd/0 >> " + file.string() + "; echo done")};
   EXPECT_FALSE(follow(child).value());
+  ::sched_setscheduler(0, SCHED_OTHER, &usual);
+  ::pthread_sigmask(SIG_SETMASK, &before, nullptr);
   ::close(57), ::close(open);
   std::ifstream in{file};
   const std::string seen{std::istreambuf_iterator<char>{in}, {}};
   EXPECT_EQ(seen.find("57"), std::string::npos) << seen;
-  const std::size_t ignored = seen.find("SigIgn:");
-  ASSERT_NE(ignored, std::string::npos) << seen;
-  EXPECT_EQ(std::stoull(seen.substr(ignored + 7), nullptr, 16) >> (SIGPIPE - 1) & 1, 0u) << seen;
+  for (const auto& [name, signal] : {std::pair{"SigIgn:", SIGPIPE}, std::pair{"SigBlk:", SIGUSR1}}) {
+    const std::size_t set = seen.find(name);
+    ASSERT_NE(set, std::string::npos) << seen;
+    EXPECT_EQ(std::stoull(seen.substr(set + 7), nullptr, 16) >> (signal - 1) & 1, 0u) << seen;
+  }
+  EXPECT_NE(seen.find("policy 0\n"), std::string::npos) << seen;
   EXPECT_NE(seen.find("/dev/null"), std::string::npos) << seen;
 }
 

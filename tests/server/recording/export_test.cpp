@@ -239,8 +239,14 @@ TEST_F(ExportTest, TheCommandWritesWhatTheStationExports) {
     options.run = run;
     options.to = folder_ / "out.csv";
     options.data_dir = folder_;
+    options.form.is_json = true;
     std::ostringstream out;
     EXPECT_EQ(cli::run(options, out), 0);
+    const nlohmann::json said{{"run_id", run},
+                              {"format", "csv"},
+                              {"file", options.to.string()},
+                              {"size_bytes", std::filesystem::file_size(options.to)}};
+    EXPECT_EQ(nlohmann::json::parse(out.str()), said);
     std::ifstream in{options.to};
     const std::string written{std::istreambuf_iterator<char>{in}, {}};
     EXPECT_EQ(written.size(), expected.size());
