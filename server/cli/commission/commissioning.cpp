@@ -102,18 +102,23 @@ void Commissioning::ask_for_room() {
       free_m, needed_m(plan_), plan_.largest_duty)};
 }
 
+void Commissioning::stop_and_reset() {
+  ++stops_.asked;
+  const StopAnswer stop = robot_.stop();
+  if (!stop.is_confirmed) throw std::runtime_error{fmt::format("stop {} is not confirmed: {}", stops_.asked, stop.why)};
+  stops_.confirmed_ms.push_back(stop.confirmed_ms);
+  robot_.reset(stop.emergency_id);
+}
+
+// SAFETY: the motor runs only after this.
 void Commissioning::prove_stops() {
   person_.confirm(fmt::format("Begin with {} emergency stops? The motor stays off.", kStops));
-  for (int i = 0; i < kStops; ++i) {
-    ++stops_.asked;
-    const StopAnswer stop = robot_.stop();
-    if (!stop.is_confirmed) {
-      stops_.not_confirmed = fmt::format("stop {} is not: {}", stops_.asked, stop.why);
-      add(judge_stops(stops_));
-      throw std::runtime_error{"a stop was not confirmed, so the motor must not run"};
-    }
-    stops_.confirmed_ms.push_back(stop.confirmed_ms);
-    robot_.reset(stop.emergency_id);
+  try {
+    for (int i = 0; i < kStops; ++i) stop_and_reset();
+  } catch (const std::exception& error) {
+    stops_.not_confirmed = error.what();
+    add(judge_stops(stops_));
+    throw std::runtime_error{"the stops are not proved, so the motor must not run"};
   }
   add(judge_stops(stops_));
   travel_.worst_stop_ms = worst_stop_ms(stops_);

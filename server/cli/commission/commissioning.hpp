@@ -32,7 +32,8 @@ class Commissioning {
   void look_at_robot();  // throws when it cannot begin
   void ask_for_room();   // throws when there is too little
   void perform();
-  void prove_stops();  // throws when one is not confirmed
+  void prove_stops();  // throws when one is not confirmed, or not reset
+  void stop_and_reset();
   void measure_at_rest();
   void push();
   void find_direction();

@@ -282,16 +282,18 @@ StepFinding judge_motor_constant(const MotorFacts& facts) {
     finding.found += "; both lags are not told apart";
   }
   finding.figures["fit_percent"] = facts.fit.value("fit_percent", json());
+  finding.figures["end"] = facts.fit.value("end", json());
   finding.figures["residuals_are_white"] = facts.fit.value("residuals_are_white", json());
   finding.figures["warnings"] = warnings;
   const bool is_white = facts.fit.value("residuals_are_white", json()) == true;
+  const bool has_converged = facts.fit.value("end", json()) == "converged";
   if (!(*gain > 0)) {
     finding.verdict = Verdict::fail;
     finding.action = "the robot moves against its duty: see to motor and axis first";
   } else if (!(gain_sigma <= kPoorGain * *gain)) {
     finding.verdict = Verdict::attention;
     finding.action = "the step says too little: repeat with more --duty, or in a fluid at rest";
-  } else if (!is_white || (lags && lag_sigmas && (*lag_sigmas)[0] > kPoorLag * (*lags)[0])) {
+  } else if (!has_converged || !is_white || (lags && lag_sigmas && (*lag_sigmas)[0] > kPoorLag * (*lags)[0])) {
     finding.verdict = Verdict::attention;
     finding.action =
         "take it for a first figure: a fluid with orders of its own needs `identification_set` "

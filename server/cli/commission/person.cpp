@@ -65,7 +65,11 @@ Interruption::Interruption() : signals_{loop_, SIGINT, SIGTERM, SIGHUP} {
 
 void Interruption::wait(std::chrono::milliseconds time) {
   loop_.restart();
-  loop_.run_for(time);
+  loop_.poll();  // run_for() of no time runs nothing
+  if (!has_come_ && time.count() > 0) {
+    loop_.restart();
+    loop_.run_for(time);
+  }
   if (has_come_) throw Interrupted{};
 }
 

@@ -85,7 +85,7 @@ StepFinding judge_stops(const StopFacts& facts) {
   finding.figures = {{"stops", facts.asked}, {"confirmed", sorted.size()}, {"confirmed_ms", facts.confirmed_ms}};
   finding.figures["probe_round_trip_ms"] =
       facts.round_trip_ms ? nlohmann::ordered_json(*facts.round_trip_ms) : nlohmann::ordered_json(nullptr);
-  if (facts.asked == 0 || sorted.size() < facts.asked) {
+  if (facts.asked == 0 || sorted.size() < facts.asked || !facts.not_confirmed.empty()) {
     finding.verdict = Verdict::fail;
     finding.found = fmt::format("{} of {} stops confirmed; {}", sorted.size(), facts.asked,
                                 facts.not_confirmed.empty() ? "the rest is missing" : facts.not_confirmed);

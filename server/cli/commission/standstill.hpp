@@ -27,7 +27,7 @@ StepFinding judge_versions(const VersionFacts& facts);
 struct StopFacts {
   std::size_t asked = 0;                // stops
   std::vector<double> confirmed_ms;     // of those that the robot itself confirmed, as the station measured them
-  std::string not_confirmed;            // of the one that ended the trial; empty: none
+  std::string not_confirmed;            // or not reset: why, of the one that ended the trial; empty: none
   std::optional<double> round_trip_ms;  // of the station's last probe of the same way
 };
 

@@ -59,6 +59,7 @@ TEST(CommissionStops, PassOnlyWhenEachIsConfirmed) {
   EXPECT_EQ(bad.verdict, Verdict::fail);
   EXPECT_THAT(bad.found, HasSubstr("3 of 4 stops confirmed; stop 4 is not"));
   EXPECT_EQ(judge_stops({}).verdict, Verdict::fail);
+  EXPECT_EQ(judge_stops({2, {1.0, 1.0}, "the emergency was not reset", {}}).verdict, Verdict::fail);
 }
 
 TEST(CommissionVersions, WantOneVersionAndACalibratedSensor) {
@@ -193,6 +194,7 @@ json fit_of(double gain, double sigma, double b1, double b2) {
           {"correlation_of", {"kp", "b1", "b2"}},
           {"correlation", {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}},
           {"residuals_are_white", true},
+          {"end", "converged"},
           {"fit_percent", 80}};
 }
 
