@@ -3,7 +3,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <map>
 
 #include "server/api/bodies/json.hpp"
@@ -54,22 +53,13 @@ http::Answer without_upgrade(FoxgloveRoutes parts, http::Request) {
   co_return response;
 }
 
-bool offers_protocol(const http::Request& request) {
-  const std::string offered = request.header("sec-websocket-protocol");
-  const auto is_ours = [](std::string_view word) {
-    const auto begin = std::min(word.find_first_not_of(' '), word.size());
-    return word.substr(begin, word.find_last_not_of(' ') + 1 - begin) == kFoxgloveProtocol;
-  };
-  return std::ranges::any_of(http::split(offered, ','), is_ours);
-}
-
 // The ticket is looked at last, so that a wrong request does not use it up.
 std::expected<identity::Caller, http::Response> let_in(const FoxgloveRoutes& parts, const http::Request& request) {
   if (!parts.is_enabled) return std::unexpected{is_off()};
-  if (!offers_protocol(request)) {
-    return std::unexpected{
-        http::problem(400, fmt::format("the client does not offer the WebSocket sub-protocol {}", kFoxgloveProtocol),
-                      "unknown_protocol")};
+  if (foxglove_protocol(request.header("sec-websocket-protocol")).empty()) {
+    return std::unexpected{http::problem(
+        400, "the client does not offer the WebSocket sub-protocol foxglove.websocket.v1, nor foxglove.sdk.v1",
+        "unknown_protocol")};
   }
   std::map<std::string, std::string> query;
   for (auto& [name, value] : request.target.query().value_or(http::Target::Query{})) query.emplace(name, value);

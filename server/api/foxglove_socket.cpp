@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <array>
 #include <boost/asio/as_tuple.hpp>
 #include <boost/asio/experimental/awaitable_operators.hpp>
@@ -24,6 +25,8 @@ using namespace asio::experimental::awaitable_operators;  // NOLINT: operators o
 
 namespace {
 
+constexpr std::array<std::string_view, 2> kProtocols{"foxglove.websocket.v1", "foxglove.sdk.v1"};
+
 std::optional<station::RobotId> robot_of(const http::UpgradeRequest& upgrade) {
   const auto query = http::Target{std::string{upgrade.target()}}.query();
   if (!query) return std::nullopt;
@@ -35,20 +38,21 @@ std::optional<station::RobotId> robot_of(const http::UpgradeRequest& upgrade) {
 
 class FoxgloveClient {
  public:
-  FoxgloveClient(http::HttpStream stream, identity::Caller caller, std::optional<station::RobotId> robot,
+  FoxgloveClient(http::HttpStream stream, identity::Caller caller, const http::UpgradeRequest& upgrade,
                  FoxgloveClients& clients)
       : socket_{std::move(stream)},
         caller_{std::move(caller)},
         clients_{clients},
         parts_{clients.live},
-        session_{parts_.loop, parts_.clock, std::move(robot)},
+        session_{parts_.loop, parts_.clock, robot_of(upgrade)},
         peer_{parts_.clock} {
     websocket::stream_base::timeout none;  // time is the injected clock's business
     none.handshake_timeout = none.idle_timeout = websocket::stream_base::none();
     none.keep_alive_pings = false;
     socket_.set_option(none);
-    socket_.set_option(websocket::stream_base::decorator{[](websocket::response_type& response) {
-      response.set(beast::http::field::sec_websocket_protocol, kFoxgloveProtocol);
+    const std::string protocol = foxglove_protocol(std::string{upgrade[beast::http::field::sec_websocket_protocol]});
+    socket_.set_option(websocket::stream_base::decorator{[protocol](websocket::response_type& response) {
+      response.set(beast::http::field::sec_websocket_protocol, protocol);
     }});
     socket_.read_message_max(foxglove::kMaxClientMessageBytes);
     socket_.auto_fragment(false);
@@ -138,9 +142,19 @@ class FoxgloveClient {
 
 }  // namespace
 
+std::string foxglove_protocol(const std::string& offered) {
+  std::string without_blanks = offered;
+  std::erase(without_blanks, ' ');
+  const std::vector<std::string> words = http::split(without_blanks, ',');
+  for (const std::string_view known : kProtocols) {
+    if (std::ranges::find(words, known) != words.end()) return std::string{known};
+  }
+  return "";
+}
+
 asio::awaitable<void> serve_foxglove(http::HttpStream stream, http::UpgradeRequest upgrade, identity::Caller caller,
                                      FoxgloveClients& clients) {
-  FoxgloveClient client{std::move(stream), std::move(caller), robot_of(upgrade), clients};
+  FoxgloveClient client{std::move(stream), std::move(caller), upgrade, clients};
   co_await client.run(std::move(upgrade));
 }
 

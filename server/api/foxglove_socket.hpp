@@ -16,7 +16,9 @@
 
 namespace server::api {
 
-inline constexpr const char* kFoxgloveProtocol = "foxglove.websocket.v1";  // of WebSocket's sub-protocols
+// Of the sub-protocols that a client offers, as in Sec-WebSocket-Protocol, the one to be spoken; empty: none is known.
+// What is served of both is the same.
+std::string foxglove_protocol(const std::string& offered);
 
 // Everything outlives every client.
 struct FoxgloveClients {

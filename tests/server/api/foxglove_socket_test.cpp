@@ -53,6 +53,12 @@ TEST_F(FoxgloveSocketTest, ATicketLetsInOnceWhateverTheOrigin) {
   EXPECT_TRUE(open(link)->answer.starts_with("HTTP/1.1 401 ")) << "it was used";
 }
 
+TEST_F(FoxgloveSocketTest, ANewerClientIsAnsweredByItsOwnName) {
+  const auto page = open(new_link(), "Sec-WebSocket-Protocol: foxglove.sdk.v2,foxglove.sdk.v1\r\n");
+  ASSERT_TRUE(page->open()) << page->answer;
+  EXPECT_NE(page->answer.find("Sec-WebSocket-Protocol: foxglove.sdk.v1\r\n"), std::string::npos) << page->answer;
+}
+
 TEST_F(FoxgloveSocketTest, NothingElseLetsIn) {
   const std::string bearer = "Authorization: Bearer " + token() + "\r\n";
   const std::string session = api->accounts().open_session("", "", "");
