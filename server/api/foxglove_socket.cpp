@@ -89,6 +89,7 @@ class FoxgloveClient {
       if (peer_.is_too_talkative()) co_await parts_.clock.sleep_until(peer_.resume_at_us());
       const std::string message = beast::buffers_to_string(buffer.data());
       buffer.clear();
+      if (!parts_.turns.take()) co_await parts_.turns.wait();
       if (socket_.got_text()) {
         session_.on_text(message);
       } else {

@@ -26,9 +26,10 @@ constexpr std::size_t kMostExplained = 20;  // connections at once
 constexpr const char* kNothingStopped = "{}; NOTHING WAS STOPPED by this command: switch the robots off by hand";
 constexpr const char* kNotKnown = "{}; IT IS NOT KNOWN whether anything was stopped: switch the robots off by hand";
 
-// SAFETY: a station that got the request stops the robots also when its answer is lost.
+// SAFETY: a station that got the request may have stopped robots, also when its answer is lost or says that it failed.
 [[noreturn]] void throw_unanswered(const StationAnswer& answer, const std::string& why) {
-  throw std::runtime_error{answer.may_have_arrived ? fmt::format(kNotKnown, why) : fmt::format(kNothingStopped, why)};
+  const bool may_have_stopped = answer.may_have_arrived || answer.status >= 500;
+  throw std::runtime_error{may_have_stopped ? fmt::format(kNotKnown, why) : fmt::format(kNothingStopped, why)};
 }
 
 // What became of the stop of one robot.

@@ -17,6 +17,8 @@ namespace {
 namespace asio = boost::asio;
 using asio::ip::tcp;
 
+constexpr const char* kFailed = R"({"title":"the station failed")";  // an answer that begins so has the status 500
+
 // Answers nothing before as many requests have come as it expects; then all, the last one first.
 class SlowStation {
  public:
@@ -47,9 +49,10 @@ class SlowStation {
     answer(question, then_());
   }
   static void answer(tcp::socket& socket, const std::string& body) {
-    const std::string text =
-        "HTTP/1.1 200 OK\r\nContent-Type: application/json\r\nContent-Length: " + std::to_string(body.size()) +
-        "\r\n\r\n" + body;
+    const std::string status = body.starts_with(kFailed) ? "500 Internal Server Error" : "200 OK";
+    const std::string text = "HTTP/1.1 " + status +
+                             "\r\nContent-Type: application/json\r\nContent-Length: " + std::to_string(body.size()) +
+                             "\r\n\r\n" + body;
     asio::write(socket, asio::buffer(text));
   }
 
@@ -147,6 +150,14 @@ TEST_F(StopTool, RobotsThatTheAnswerDoesNotNameAreNotConfirmed) {
 TEST_F(StopTool, AnAnswerThatBreaksOffLeavesItOpenWhatWasStopped) {
   const SlowStation station{folder_ / "data", {"{"}};
   const Answer answer = ask("stop a --data @data");
+  EXPECT_EQ(answer.exit_code, 1);
+  EXPECT_THAT(answer.error, ::testing::HasSubstr("IT IS NOT KNOWN"));
+}
+
+// SAFETY: a station that failed while it answered may have stopped robots before.
+TEST_F(StopTool, AStationThatFailsLeavesItOpenWhatWasStopped) {
+  const SlowStation station{folder_ / "data", {std::string{kFailed} + "}"}};
+  const Answer answer = ask("stop --data @data");
   EXPECT_EQ(answer.exit_code, 1);
   EXPECT_THAT(answer.error, ::testing::HasSubstr("IT IS NOT KNOWN"));
 }
