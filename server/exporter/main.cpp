@@ -1,4 +1,5 @@
 // Writes one run into one file for the program that started it, and ends with that program.
+#include <sqlite3.h>
 #include <sys/prctl.h>
 #include <sys/resource.h>
 #include <sys/syscall.h>
@@ -23,7 +24,14 @@ static void be_modest() {
   ::syscall(SYS_ioprio_set, kOfThisProcess, 0, kIdleClass << kClassShift);
 }
 
+// It has one thread, and nobody asks how much memory SQLite has: so there are neither locks nor counts.
+static void configure_sqlite() {
+  ::sqlite3_config(SQLITE_CONFIG_SINGLETHREAD);
+  ::sqlite3_config(SQLITE_CONFIG_MEMSTATUS, 0);
+}
+
 int main(int argc, char** argv) try {
+  configure_sqlite();
   std::signal(SIGPIPE, SIG_IGN);
   std::signal(SIGXFSZ, SIG_IGN);  // a file that may not grow is an error of write()
   const auto received = storage::parse_export_arguments({argv + 1, argv + argc});

@@ -23,7 +23,7 @@ CREATE TABLE sample (
   first_received_at_us INTEGER NOT NULL,
   received_at_us INTEGER NOT NULL,
 )sql";
-constexpr int kPlaceColumnCount = 8;
+constexpr int kPlaceColumnCount = 8, kSeqColumn = 3, kClockColumn = 6;  // counted from 1
 constexpr const char* kOtherColumns =
     R"sql(  gap_before INTEGER NOT NULL,             -- samples that are missing right before this one
   gap_after INTEGER NOT NULL,              -- and after it, to the end of its span
@@ -31,6 +31,8 @@ constexpr const char* kOtherColumns =
 );
 )sql";
 constexpr int kOtherColumnCount = 3;
+constexpr int kGapColumn =
+    kPlaceColumnCount + static_cast<int>(station::kSampleFieldCount + station::kBatchFieldCount) + 1;
 
 template <station::FieldKind kind>
 constexpr const char* sql_type() {
@@ -101,37 +103,45 @@ bool RunFile::add_samples(SQLite::Database& database) {
   return true;
 }
 
+// Values stay bound from row to row: of each sample only those are bound that are its own.
 void RunFile::add(const ExportSegment& exported) {
   const Segment& segment = exported.part->segment;
-  const std::string boot_id = std::to_string(exported.part->boot_id);
-  bind_shared(segment.context);
+  bind_shared(exported);
   for (std::size_t index = 0; index < segment.samples.size(); ++index) {
     const std::uint64_t robot_time_us = segment.robot_time_us(index);
-    bind_all(*insert_, exported.part->span, boot_id, signed_seq(segment.first_seq + index), robot_time_us,
-             static_cast<std::int64_t>(robot_time_us) + segment.utc_offset_us, segment.clock_uncertainty_us,
-             segment.first_received_at_us, segment.received_at_us);
-    int column = kPlaceColumnCount;
+    int column = kSeqColumn;
+    bind_value(*insert_, column, signed_seq(segment.first_seq + index));
+    bind_value(*insert_, ++column, robot_time_us);
+    bind_value(*insert_, ++column, static_cast<std::int64_t>(robot_time_us) + segment.utc_offset_us);
+    column = kPlaceColumnCount;
     for (const float value : values_of(segment.samples[index])) bind_value(*insert_, ++column, value);
-    column += static_cast<int>(station::kBatchFieldCount);
-    bind_value(*insert_, ++column, signed_seq(index == 0 ? exported.gap_before : 0));
-    bind_value(*insert_, ++column, signed_seq(index + 1 == segment.samples.size() ? exported.gap_after : 0));
+    if (index <= 1) bind_value(*insert_, kGapColumn, signed_seq(index == 0 ? exported.gap_before : 0));
+    if (index + 1 == segment.samples.size()) bind_value(*insert_, kGapColumn + 1, signed_seq(exported.gap_after));
     insert_->exec();
+    insert_->reset();
   }
 }
 
-// Values stay bound from row to row.
-void RunFile::bind_shared(const station::SampleContext& context) {
+void RunFile::bind_shared(const ExportSegment& exported) {
+  const Segment& segment = exported.part->segment;
   insert_->tryReset();
-  int column = kPlaceColumnCount + static_cast<int>(station::kSampleFieldCount);
+  bind_value(*insert_, 1, exported.part->span);
+  bind_value(*insert_, 2, std::to_string(exported.part->boot_id));
+  int column = kClockColumn;
+  bind_value(*insert_, column, segment.clock_uncertainty_us);
+  bind_value(*insert_, ++column, segment.first_received_at_us);
+  bind_value(*insert_, ++column, segment.received_at_us);
+  column = kPlaceColumnCount + static_cast<int>(station::kSampleFieldCount);
   station::for_each_batch_field([&]<class Value>(const station::BatchField<Value>& field) {
-    const Value& value = context.*field.member;
+    const Value& value = segment.context.*field.member;
     if constexpr (station::BatchField<Value>::kKind == station::FieldKind::id) {
       bind_value(*insert_, ++column, std::to_string(value));
     } else {
       bind_value(*insert_, ++column, station::text_or_value(value));
     }
   });
-  bind_value(*insert_, column + kOtherColumnCount, unknown_values(context));
+  bind_value(*insert_, kGapColumn + 1, std::int64_t{0});
+  bind_value(*insert_, kGapColumn + 2, unknown_values(segment.context));
 }
 
 }  // namespace server::storage

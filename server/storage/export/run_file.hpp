@@ -42,7 +42,7 @@ class RunFile {
   void begin();
   bool add_samples(SQLite::Database& database);
   void add(const ExportSegment& segment);
-  void bind_shared(const station::SampleContext& context);
+  void bind_shared(const ExportSegment& exported);
 
   std::filesystem::path path_;
   std::string store_;
