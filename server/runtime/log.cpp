@@ -8,6 +8,7 @@
 #include <spdlog/spdlog.h>
 
 #include <chrono>
+#include <cstdlib>
 #include <iterator>
 #include <nlohmann/json.hpp>
 #include <string_view>
@@ -70,7 +71,10 @@ std::unique_ptr<spdlog::formatter> log_formatter(const std::string& format) {
 }
 
 void start_log(const std::string& level, const std::string& format) {
-  spdlog::set_default_logger(spdlog::stderr_color_mt("rheonaut"));
+  const char* none = std::getenv("NO_COLOR");  // https://no-color.org
+  const bool may_colour = none == nullptr || *none == '\0';
+  spdlog::set_default_logger(
+      spdlog::stderr_color_mt("rheonaut", may_colour ? spdlog::color_mode::automatic : spdlog::color_mode::never));
   spdlog::set_level(spdlog::level::from_str(level));
   spdlog::set_formatter(log_formatter(format));
 }

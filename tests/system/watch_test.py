@@ -1,4 +1,5 @@
 """`rheonaut watch` with a running station: one table, JSON lines, and a real terminal of 60 columns that is restored."""
+import contextlib
 import fcntl
 import json
 import os
@@ -71,6 +72,41 @@ class WatchTest(unittest.TestCase):
                     process.wait()
                     os.close(terminal)
                     os.close(inner)
+
+    @contextlib.contextmanager
+    def on_a_terminal(self, place, *words, **environment):
+        """`rheonaut watch` on a terminal of its own, which is yielded."""
+        terminal, inner = pty.openpty()
+        fcntl.ioctl(inner, termios.TIOCSWINSZ, struct.pack("HHHH", 20, 100, 0, 0))
+        process = subprocess.Popen([str(BIN / "rheonaut"), "watch", "--data", str(place.data), *words], stdin=inner,
+                                   stdout=inner, stderr=subprocess.DEVNULL,
+                                   env={**os.environ, "NO_COLOR": "", **environment})
+        try:
+            yield terminal
+        finally:
+            process.kill()
+            process.wait()
+            os.close(terminal)
+            os.close(inner)
+
+    def test_colours_mark_a_stop_and_old_values_unless_NO_COLOR_is_set_and_silence_is_said(self):
+        with lab() as place:
+            station = place.start_station()
+            robot = place.start_robot(station, "sim-1")
+            station.wait_for_robot("sim-1", timeout_s=60)
+            station.post("/api/v1/robots/sim-1/emergency-stop")
+            with self.on_a_terminal(place) as terminal:
+                self.read_until(terminal, lambda text: re.search("\x1b\\[1;31msim-1 .*STOPPED: operator.*\x1b\\[0m", text))
+                robot.send_signal(signal.SIGSTOP)
+                self.read_until(terminal, lambda text: re.search("\x1b\\[2msim-1 ", text))
+                robot.send_signal(signal.SIGCONT)
+            with self.on_a_terminal(place, NO_COLOR="1") as terminal:
+                shown = self.read_until(terminal, lambda text: text.count("STOPPED: operator") >= 2)
+                self.assertNotRegex(shown, "\x1b\\[[0-9;]*m")
+                place.kill_station()
+                shown = self.read_until(terminal, lambda text: text.count("NO ANSWER: ") >= 2)
+                self.assertIn("STOPPED: operator", shown.rpartition("\x1b[H")[2] + shown, "the last values stay")
+                self.assertNotRegex(shown, "\x1b\\[[0-9;]*m")
 
     def read_until(self, terminal, is_enough):
         text, deadline = b"", time.monotonic() + 60

@@ -3,10 +3,8 @@
 
 #include <fmt/format.h>
 #include <fmt/ostream.h>
-#include <unistd.h>
 
 #include <CLI/CLI.hpp>
-#include <cstdio>
 #include <fstream>
 #include <iostream>
 #include <iterator>
@@ -18,6 +16,7 @@
 #include "server/cli/accounts/station_client.hpp"
 #include "server/cli/terminal/options.hpp"
 #include "server/cli/terminal/output.hpp"
+#include "server/cli/terminal/progress.hpp"
 
 namespace server::cli {
 namespace {
@@ -63,17 +62,11 @@ std::string progress_of(const json& job) {
 }
 
 json wait_for(const JobCommand& options, std::int64_t id) {
-  const bool is_watched = ::isatty(STDERR_FILENO) != 0;
+  Progress progress{fmt::format("job {}", id), {.is_json = options.json}};
   for (;;) {
     json job = ask(options, "GET", fmt::format("{}/{}?wait_ms={}", kJobs, id, kLook_ms));
-    if (!job.at("ended_at_us").is_null()) {
-      if (is_watched) fmt::print(stderr, "\r\x1b[K");
-      return job;
-    }
-    if (is_watched) {
-      fmt::print(stderr, "\r\x1b[Kjob {}: {} {}", id, job.at("state").get<std::string>(), progress_of(job));
-      std::fflush(stderr);
-    }
+    if (!job.at("ended_at_us").is_null()) return job;
+    progress.set_detail(fmt::format("{} {}", job.at("state").get<std::string>(), progress_of(job)));
   }
 }
 

@@ -5,6 +5,7 @@
 
 #include <stdexcept>
 
+#include "server/config/endpoint.hpp"
 #include "server/tls/tls_certificate.hpp"
 
 namespace server::cli {
@@ -29,15 +30,14 @@ void check_certificate(const SSL* connection, const std::filesystem::path& certi
   }
 }
 
-HttpRequest request_to(const std::string& method, const std::string& target, const std::string& token,
-                       const nlohmann::json& body) {
-  HttpRequest request{http::string_to_verb(method), target, 11};
-  request.set(http::field::host, "localhost");
+HttpRequest request_to(const StationPlace& place, const StationRequest& asked, const std::string& token) {
+  HttpRequest request{http::string_to_verb(asked.method), asked.target, 11};
+  request.set(http::field::host, config::text(place.endpoint));
   request.set(http::field::authorization, "Bearer " + token);
   request.keep_alive(false);
-  if (!body.is_null()) {
+  if (!asked.body.is_null()) {
     request.set(http::field::content_type, "application/json");
-    request.body() = body.dump();
+    request.body() = asked.body.dump();
   }
   request.prepare_payload();
   return request;

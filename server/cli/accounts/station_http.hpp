@@ -13,9 +13,9 @@ using HttpRequest = boost::beast::http::request<boost::beast::http::string_body>
 
 inline constexpr std::uint64_t kMaxAnswerBytes = 2'000'000'000;  // of an archive of hours
 
-// With the station's token; null: without a body.
-HttpRequest request_to(const std::string& method, const std::string& target, const std::string& token,
-                       const nlohmann::json& body);
+// With the station's token; null: without a body. The Host is the address that is asked, with its port: the station
+// makes links of it.
+HttpRequest request_to(const StationPlace& place, const StationRequest& request, const std::string& token);
 
 // Throws nlohmann::json::exception for a body that is not what its header says.
 StationAnswer answer_of(boost::beast::http::response<boost::beast::http::string_body> response);

@@ -136,7 +136,7 @@ asio::awaitable<void> save_unless_stalled(Download& download, microseconds patie
 std::vector<StationAnswer> StationClient::ask_at_once(const std::vector<StationRequest>& requests,
                                                       microseconds patience) const {
   std::vector<HttpRequest> prepared;
-  for (const StationRequest& one : requests) prepared.push_back(request_to(one.method, one.target, token_, one.body));
+  for (const StationRequest& one : requests) prepared.push_back(request_to(place_, one, token_));
   std::vector<StationAnswer> answers(requests.size());
   asio::io_context loop{1};
   runtime::SystemClock clock{loop};
@@ -149,7 +149,7 @@ std::vector<StationAnswer> StationClient::ask_at_once(const std::vector<StationR
 }
 
 void StationClient::save(const std::string& target, const std::filesystem::path& file, TimeLimit limit) const {
-  const HttpRequest request = request_to("GET", target, token_, nullptr);
+  const HttpRequest request = request_to(place_, {"GET", target}, token_);
   const storage::Draft part{std::filesystem::path{file}.concat(".part")};
   if (!std::ofstream{part.path()}) throw std::runtime_error{fmt::format("cannot write '{}'", part.path().string())};
   asio::io_context loop{1};

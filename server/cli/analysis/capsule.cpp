@@ -10,6 +10,7 @@
 
 #include "server/cli/accounts/station_client.hpp"
 #include "server/cli/terminal/options.hpp"
+#include "server/cli/terminal/progress.hpp"
 
 namespace server::cli {
 
@@ -25,6 +26,7 @@ void add_options(CLI::App& command, CapsuleQuestion& options) {
 }
 
 int run(const CapsuleQuestion& options, std::ostream& out) {
+  const Progress progress{"capsule: the station computes it", options.form};
   StationClient{options.data_dir}.save(fmt::format("/api/v1/runs/{}/capsule.eln", options.run), options.file,
                                        timeout(options.timeout_s));
   const auto size_bytes = std::filesystem::file_size(options.file);

@@ -11,6 +11,7 @@
 #include "server/analysis/comparison/aligned_runs.hpp"
 #include "server/cli/accounts/station_client.hpp"
 #include "server/cli/terminal/options.hpp"
+#include "server/cli/terminal/progress.hpp"
 
 namespace server::cli {
 namespace {
@@ -114,6 +115,7 @@ void add_options(CLI::App& command, CompareQuestion& options) {
 int run(const CompareQuestion& options, std::ostream& out) {
   const std::string target = fmt::format("/api/v1/run-comparison/traces?{}&channels={}",
                                          query_of(options.runs, options.traces), options.channels);
+  const Progress progress{"compare: the station computes", options.form};
   const json compared = asked(StationClient{options.data_dir}.ask("GET", target, nullptr, timeout(options.timeout_s)));
   if (options.form.is_json) {
     fmt::print(out, "{}\n", compared.dump());

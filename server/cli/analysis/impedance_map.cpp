@@ -12,6 +12,7 @@
 #include "server/analysis/comparison/impedance_map.hpp"
 #include "server/cli/accounts/station_client.hpp"
 #include "server/cli/terminal/options.hpp"
+#include "server/cli/terminal/progress.hpp"
 
 namespace server::cli {
 namespace {
@@ -90,6 +91,7 @@ int run(const ImpedanceMapQuestion& options, std::ostream& out) {
   const std::string of = is_one ? fmt::format("runs/{}/impedance-map?", options.runs.front())
                                 : fmt::format("run-comparison/impedance-map?runs={}&", fmt::join(options.runs, ","));
   const std::string target = fmt::format("/api/v1/{}bin_mm={}", of, options.bin_mm);
+  const Progress progress{"impedance-map: the station computes", options.form};
   const json answer = asked(StationClient{options.data_dir}.ask("GET", target, nullptr, timeout(options.timeout_s)));
   const json& map = is_one ? answer : answer.at("together");
   if (options.form.is_json) {

@@ -11,6 +11,7 @@
 #include "server/cli/accounts/station_client.hpp"
 #include "server/cli/terminal/options.hpp"
 #include "server/cli/terminal/output.hpp"
+#include "server/cli/terminal/progress.hpp"
 
 namespace server::cli {
 namespace {
@@ -83,6 +84,7 @@ int run(const MetricsQuestion& options, std::ostream& out) {
   const bool is_one = options.runs.size() == 1;
   const std::string target = is_one ? fmt::format("/api/v1/runs/{}/metrics", options.runs.front())
                                     : fmt::format("/api/v1/run-comparison?runs={}", fmt::join(options.runs, ","));
+  const Progress progress{"metrics: the station computes", OutputForm{.is_json = options.json}};
   const json answer = asked(StationClient{options.data_dir}.ask("GET", target, nullptr, timeout(options.timeout_s)));
   if (options.json) {
     fmt::print(out, "{}\n", answer.dump(2));

@@ -11,6 +11,7 @@
 #include "server/analysis/comparison/aligned_runs.hpp"
 #include "server/cli/accounts/station_client.hpp"
 #include "server/cli/terminal/options.hpp"
+#include "server/cli/terminal/progress.hpp"
 
 namespace server::cli {
 
@@ -33,6 +34,7 @@ int run(const ReportQuestion& options, std::ostream& out) {
   const std::string target = options.runs.size() == 1 ? fmt::format("/api/v1/runs/{}/report.html", options.runs.front())
                                                       : fmt::format("/api/v1/run-comparison/report.html?{}",
                                                                     query_of(options.runs, options.traces));
+  const Progress progress{"report: the station computes it", options.form};
   StationClient{options.data_dir}.save(target, options.file, timeout(options.timeout_s));
   if (options.form.is_json) {
     write_json(out, {{"runs", options.runs},

@@ -13,6 +13,7 @@
 
 #include "server/cli/accounts/station_client.hpp"
 #include "server/cli/terminal/options.hpp"
+#include "server/cli/terminal/progress.hpp"
 #include "server/config/data_folder.hpp"
 #include "server/runtime/clock.hpp"
 #include "server/runtime/tasks.hpp"
@@ -79,6 +80,7 @@ void add_options(CLI::App& command, Backup& options) {
 int run(const Backup& options, std::ostream& out) {
   check(options);
   umask(077);
+  const Progress progress{"backup: the database is copied and verified", options.form};
   if (const std::optional<config::FolderLock> lock = config::FolderLock::try_take(options.data_dir)) {
     storage::back_up_closed(options.data_dir / "station.sqlite", options.to);
   } else {

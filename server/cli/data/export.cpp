@@ -2,14 +2,12 @@
 #include "server/cli/data/export.hpp"
 
 #include <fmt/format.h>
-#include <unistd.h>
-
-#include <cstdio>
 #include <ostream>
 #include <stdexcept>
 
 #include "server/cli/terminal/exit_status.hpp"
 #include "server/cli/terminal/options.hpp"
+#include "server/cli/terminal/progress.hpp"
 #include "server/storage/database/finished_file.hpp"
 #include "server/storage/export/export_child.hpp"
 
@@ -43,14 +41,12 @@ class PartFile {
   std::filesystem::path path_;
 };
 
-// Shows how far it is, where somebody watches.
-void write(const storage::ExportOrder& order) {
-  const bool is_watched = ::isatty(STDERR_FILENO) == 1;
+void write(const storage::ExportOrder& order, const OutputForm& form) {
+  Progress progress{"export", form};
   storage::ExportChild child{order};
   for (Result<bool> more = true; *more;) {
     more = child.advance();
-    if (is_watched) fmt::print(stderr, "\r{:3.0f} %", 100 * child.progress().share());
-    if (is_watched && (!more || !*more)) fmt::print(stderr, "\r     \r");
+    progress.set_share(child.progress().share());
     if (!more) throw std::runtime_error{more.error().detail};
   }
 }
@@ -83,7 +79,7 @@ int run(const Export& options, std::ostream& out) {
     query.channels = *channels;
   }
   PartFile part{options.to};
-  write({options.data_dir / "station.sqlite", options.format, query, part.path()});
+  write({options.data_dir / "station.sqlite", options.format, query, part.path()}, options.form);
   part.keep();
   const auto size_bytes = std::filesystem::file_size(options.to);
   if (options.form.is_json) {

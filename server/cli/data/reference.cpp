@@ -18,6 +18,7 @@
 #include "server/cli/accounts/station_client.hpp"
 #include "server/cli/terminal/exit_status.hpp"
 #include "server/cli/terminal/options.hpp"
+#include "server/cli/terminal/progress.hpp"
 #include "server/config/data_folder.hpp"
 #include "server/storage/database/database.hpp"
 #include "server/storage/query/run_reader.hpp"
@@ -200,6 +201,7 @@ void write(const ReferenceCommand& options, const storage::OutsideReference& ref
 
 void import_one(const ReferenceCommand& options, std::ostream& out) {
   const analysis::ReferenceRequest request = request_of(options);
+  const Progress progress{"reference: clock and zero are found", options.form};
   if (const auto lock = config::FolderLock::try_take(options.data_dir)) {
     write(options, import_closed(options, request), out);
     return;

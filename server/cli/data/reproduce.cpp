@@ -14,6 +14,7 @@
 #include "server/analysis/capsule/crate_metadata.hpp"
 #include "server/analysis/capsule/reproduction.hpp"
 #include "server/cli/terminal/options.hpp"
+#include "server/cli/terminal/progress.hpp"
 
 namespace server::cli {
 namespace {
@@ -105,6 +106,7 @@ void add_options(CLI::App& command, Reproduce& options) {
 
 int run(const Reproduce& options, std::ostream& out) {
   const ScratchFolder scratch;
+  const Progress progress{"reproduce", options.form};
   const auto found = analysis::reproduce(options.file, scratch.path());
   if (!found) {
     fmt::print(stderr, "rheonaut: {}: {}\n", options.file.string(), found.error().detail);

@@ -9,6 +9,7 @@
 
 #include "server/cli/accounts/author.hpp"
 #include "server/cli/terminal/options.hpp"
+#include "server/cli/terminal/progress.hpp"
 #include "server/config/data_folder.hpp"
 #include "server/storage/upkeep/restore.hpp"
 
@@ -28,6 +29,7 @@ int run(const Restore& options, std::ostream& out) {
   if (!lock) {
     throw std::runtime_error{fmt::format("a station runs in '{}'; stop it first", options.data_dir.string())};
   }
+  const Progress progress{"restore: the database is copied and verified", options.form};
   const storage::RestoredStore restored =
       storage::restore_database(options.from, options.data_dir, command_line_author());
   const std::filesystem::path database = options.data_dir / "station.sqlite";

@@ -9,6 +9,7 @@
 #include <limits>
 
 #include "server/cli/terminal/options.hpp"
+#include "server/cli/terminal/progress.hpp"
 #include "server/storage/database/database.hpp"
 #include "server/storage/database/schema.hpp"
 #include "server/storage/export/run_file.hpp"
@@ -180,6 +181,7 @@ void add_options(CLI::App& command, Verify& options) {
 
 int run(const Verify& options, std::ostream& out) {
   const std::filesystem::path path = options.file.value_or(options.data_dir / "station.sqlite");
+  const Progress progress{"verify", options.form};
   const auto verified = is_export(path) ? verify_export(path, options) : verify_file(path, options);
   if (!verified) {
     fmt::print(stderr, "rheonaut: {}\n", one_line(verified.error().detail));

@@ -3,7 +3,6 @@
 
 #include <fmt/format.h>
 #include <fmt/ostream.h>
-#include <unistd.h>
 
 #include <CLI/CLI.hpp>
 #include <array>
@@ -19,6 +18,7 @@
 #include "server/analysis/identification_answer.hpp"
 #include "server/cli/terminal/exit_status.hpp"
 #include "server/cli/terminal/options.hpp"
+#include "server/cli/terminal/progress.hpp"
 
 namespace server::cli {
 namespace {
@@ -149,21 +149,16 @@ std::vector<analysis::RunOfMany> recordings_for(const Identify& options) {
   return runs;
 }
 
-bool show_progress(const control::Progress& progress) {
-  fmt::print(stderr, "\r{}: start {} of {}, iteration {}, sse {:.6g}   ", text(progress.structure), progress.start + 1,
-             progress.starts, progress.iteration, progress.sse);
-  std::fflush(stderr);
-  return true;
-}
-
 control::Identification search(const Identify& options, std::span<const analysis::RunOfMany> runs) {
   control::IdentificationOptions settings = options.search;
-  const bool is_watched = ::isatty(STDERR_FILENO) != 0;
-  if (is_watched) settings.on_progress = show_progress;
-  control::Identification found = runs.size() == 1 ? analysis::identify_run(runs.front().recorded, settings)
-                                                   : analysis::identify_runs(runs, settings);
-  if (is_watched) fmt::print(stderr, "\r\x1b[K");
-  return found;
+  Progress shown{"identify", options.form};
+  settings.on_progress = [&shown](const control::Progress& progress) {
+    shown.set_detail(fmt::format("{}, start {} of {}, iteration {}, sse {:.6g}", text(progress.structure),
+                                 progress.start + 1, progress.starts, progress.iteration, progress.sse));
+    return true;
+  };
+  return runs.size() == 1 ? analysis::identify_run(runs.front().recorded, settings)
+                          : analysis::identify_runs(runs, settings);
 }
 
 void write_sensor(std::ostream& out, const control::SensorFit& sensor) {

@@ -11,6 +11,7 @@
 #include "server/cli/design/discretise.hpp"
 #include "server/cli/design/robustness_table.hpp"
 #include "server/cli/terminal/options.hpp"
+#include "server/cli/terminal/progress.hpp"
 
 namespace server::cli {
 namespace {
@@ -160,6 +161,7 @@ void add_options(CLI::App& command, Tune& options) {
 }
 
 int run(const Tune& options, std::ostream& out) {
+  const Progress progress{"tune", options.form};
   if (options.is_map) return write_map(options, out);
   const control::FractionalModel plant = read(options.plant);
   const control::TuningResult result = control::tune(plant, options.spec);

@@ -182,11 +182,9 @@ int perform(const StationClient& client, Patience& patience) {
   return 0;
 }
 
-// A link for one page. Its host is that of the question; the person's browser needs the station's address.
-std::string login_link(const StationClient& client, const json& endpoints) {
-  const auto url = asked(client.ask("POST", "/api/v1/login-links")).at("url").get<std::string>();
-  const std::string scheme = endpoints.contains("tls_certificate") ? "https" : "http";
-  return fmt::format("{}://{}{}", scheme, endpoints.at("http").get<std::string>(), url.substr(url.find("/login")));
+// A link for one page.
+std::string login_link(const StationClient& client) {
+  return asked(client.ask("POST", "/api/v1/login-links")).at("url").get<std::string>();
 }
 
 std::filesystem::path own_folder() { return std::filesystem::read_symlink("/proc/self/exe").parent_path(); }
@@ -228,7 +226,7 @@ int run(const Demo& options, std::ostream&) {
     });
     const json addresses = json::parse(text_of_file(endpoints));
     const auto robots = addresses.at("robots").get<std::string>();
-    say(fmt::format("\npage: {}\n      (a link for one browser, once)\n", login_link(*client, addresses)));
+    say(fmt::format("\npage: {}\n      (a link for one browser, once)\n", login_link(*client)));
     ChildProgram robot{own_folder() / "rheonaut-sim",
                        {"--station", robots, "--id", kRobot, "--seed", std::to_string(options.seed)},
                        robot_log};
@@ -241,7 +239,7 @@ int run(const Demo& options, std::ostream&) {
     say(fmt::format("\nEverything is recorded in {}", (data / "station.sqlite").string()));
     if (!options.is_once) {
       say(fmt::format("The station and the robot stay up: drive the robot on the page. Ctrl-C ends both.\npage: {}",
-                      login_link(*client, addresses)));
+                      login_link(*client)));
       while (!station.has_ended()) patience.wait(kLook);
       throw std::runtime_error{fmt::format("the station has ended; its output is in '{}'", station_log.string())};
     }

@@ -89,8 +89,14 @@ TEST_F(HealthRoutesTest, NotReadyWhenTheDatabaseCannotBeWritten) {
 }
 
 TEST_F(HealthRoutesTest, NotReadyWhileAPortDoesNotListen) {
+  const auto listening = security.http().listening;
   security.robots().listening = 0;
   EXPECT_EQ(reasons(), Reasons{"not_listening"});
+  security.robots().listening = 1;
+  security.http().listening = 0;
+  EXPECT_EQ(reasons(), Reasons{"not_listening"});
+  security.http().listening = listening;
+  EXPECT_EQ(reasons(), Reasons{});
 }
 
 class FewConnectionsTest : public HealthRoutesTest {

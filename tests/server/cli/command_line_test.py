@@ -186,15 +186,47 @@ class CommandLineTest(unittest.TestCase):
             pathlib.Path(folder, "rheonaut-sim").write_text(run("--completion", "bash", program="rheonaut-sim").stdout)
             self.assertIn("--scenario", self.bash_offers(folder, "--sc", program="rheonaut-sim"))
 
-    def test_zsh_and_fish_read_their_scripts(self):
-        for shell in ("zsh", "fish"):
-            script = run("completion", shell).stdout
-            for command in COMMANDS:
-                for option in command.options:
-                    self.assertIn(option if shell == "zsh" else re.sub("^--?", "", option), script)
-            if shutil.which(shell):  # CI has neither
-                done = subprocess.run([shell, "-n"], input=script, capture_output=True, text=True, timeout=60)
-                self.assertEqual((done.returncode, done.stderr), (0, ""))
+    def offered_by(self, shell, script, lines):
+        """What a shell offers for each of these command lines (words, and the beginning of one): a set for each."""
+        with tempfile.TemporaryDirectory() as folder:
+            pathlib.Path(folder, "completion").write_text(run("completion", shell).stdout)
+            pathlib.Path(folder, "ask").write_text(script(f"{folder}/completion", lines))
+            quiet = "--no-config" if shell == "fish" else "--no-rcs"
+            own = {"PATH": os.environ["PATH"], "HOME": folder, "LC_ALL": "C.UTF-8"}
+            done = subprocess.run([shell, quiet, f"{folder}/ask"], capture_output=True, text=True, timeout=200, env=own)
+        self.assertEqual((done.returncode, done.stderr), (0, ""))
+        return [set(part.split()) for part in done.stdout.split("==\n")[1:]]
+
+    def check_offers(self, shell, script):
+        asked = [(command, end) for command in COMMANDS for end in ("-", "") if end or command.commands]
+        values = [(command, option, words) for command in COMMANDS for option, words in command.values.items()]
+        lines = [(*command.words, end) for command, end in asked]
+        lines += [(*command.words, option, "") for command, option, _ in values]
+        offers = self.offered_by(shell, script, lines)
+        self.assertEqual(len(offers), len(lines))
+        for (command, end), offered in zip(asked, offers):
+            with self.subTest(shell=shell, command=command.words, end=end):
+                self.assertEqual(offered, set(command.options if end else command.commands))
+        for (command, option, words), offered in zip(values, offers[len(asked):]):
+            with self.subTest(shell=shell, command=command.words, option=option):
+                self.assertEqual(offered, set(words))
+
+    def test_fish_completes_every_command_option_and_word(self):
+        def script(completion, lines):
+            asks = (f"echo ==\ncomplete -C 'rheonaut {' '.join(line)}' | string replace -r '\\t.*' ''" for line in lines)
+            return f"source {completion}\n" + "\n".join(asks)
+        self.check_offers("fish", script)
+
+    def test_zsh_completes_every_command_option_and_word(self):
+        # Functions in place of zsh's own completion, which needs a terminal: they print what they are given.
+        stubs = ("compdef() { }\n_files() { print -- FILES }\ncompadd() { print -l -- ${@:#-*} }\n"
+                 "_describe() { local name=${@[-1]}; print -l -- ${${(P)name}%%:*} }\n")
+
+        def script(completion, lines):
+            asks = (f"print -- '=='\nwords=(rheonaut {' '.join(line[:-1])} '{line[-1]}')\n"
+                    f"CURRENT={len(line) + 1}; _rheonaut" for line in lines)
+            return f"{stubs}source {completion}\n" + "\n".join(asks)
+        self.check_offers("zsh", script)
 
 
 if __name__ == "__main__":

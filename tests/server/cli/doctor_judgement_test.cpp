@@ -80,6 +80,19 @@ TEST(Redaction, RemovesSecretsInEveryFormAndLeavesWords) {
   EXPECT_EQ(redaction.of_own("rheonaut.token can be read"), "rheonaut.token can be read");
 }
 
+TEST(Redaction, RemovesTheValueAfterEachNameOfASecret) {
+  const cli::Redaction redaction;
+  for (const char* name : {"token", "password", "passwd", "secret", "bearer", "apikey", "api-key", "psk", "pwd",
+                           "wifi key", "Wi-Fi PASSWORD", "token_hash", "code"}) {
+    for (const char* between : {"=", ": ", " = \"", "=\\\""}) {
+      const std::string text = std::string{"before "} + name + between + "hunter2\" after";
+      if (std::string{name} == "code" && between[0] != '=') continue;
+      EXPECT_THAT(redaction.of(text), AllOf(Not(HasSubstr("hunter2")), HasSubstr("before "), HasSubstr(" after")))
+          << text;
+    }
+  }
+}
+
 TEST(Redaction, TakesAnyBytes) {
   const cli::Redaction redaction;
   for (const std::string& text :

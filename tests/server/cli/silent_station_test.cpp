@@ -34,13 +34,17 @@ class SilentStation {
   SilentStation(const SilentStation&) = delete;
   SilentStation& operator=(const SilentStation&) = delete;
 
+  // The head of the request, when it has been answered.
+  const std::string& request() {
+    thread_.join();
+    return request_;
+  }
   std::string address() const { return "127.0.0.1:" + std::to_string(acceptor_.local_endpoint().port()); }
 
  private:
   void serve() {
     socket_ = acceptor_.accept();
-    std::string request;
-    asio::read_until(socket_, asio::dynamic_buffer(request), "\r\n\r\n");
+    asio::read_until(socket_, asio::dynamic_buffer(request_), "\r\n\r\n");
     for (const std::string& piece : pieces_) {
       boost::system::error_code gone;  // the tool may have left
       asio::write(socket_, asio::buffer(piece), gone);
@@ -53,6 +57,7 @@ class SilentStation {
   asio::io_context loop_;
   tcp::acceptor acceptor_{loop_, {asio::ip::address_v4::loopback(), 0}};
   tcp::socket socket_{loop_};
+  std::string request_;
   std::thread thread_;
 };
 
@@ -133,6 +138,13 @@ TEST_F(SilentStationTest, AFileThatComesSlowlyIsWhole) {
   EXPECT_EQ(std::filesystem::file_size(folder_ / "run-1.html"), 60u);
   const nlohmann::json said{{"runs", {1}}, {"file", (folder_ / "run-1.html").string()}, {"size_bytes", 60}};
   EXPECT_EQ(answer.json(), said);
+}
+
+// The station makes login links of it.
+TEST_F(SilentStationTest, TheHostOfARequestIsTheAddressWithItsPort) {
+  SilentStation station{folder_ / "data", {head("application/json", 2) + "{}"}};
+  EXPECT_EQ(StationClient{folder_ / "data"}.ask("GET", "/api/v1/me").status, 200);
+  EXPECT_THAT(station.request(), HasSubstr("\r\nHost: " + station.address() + "\r\n"));
 }
 
 TEST_F(SilentStationTest, AnArchiveIsNamedInJson) {
