@@ -2,9 +2,11 @@
 confirmed, Ctrl-C. Real processes."""
 import json
 import os
+import pathlib
 import pty
 import signal
 import subprocess
+import tempfile
 import unittest
 
 from processes import BIN, commanded, lab, wait_until
@@ -60,8 +62,8 @@ class CommissionTest(unittest.TestCase):
         cls.place = cls.enterClassContext(lab())
         cls.station = cls.place.start_station()
         cls.robots = {robot: cls.start_robot(robot, scenario) for robot, scenario in
-                      (("sound", SOUND), ("wrong", WRONG), ("silent", SOUND), ("interrupted", SOUND), ("asked", SOUND))}
-        for name, value in (("position_limit_max_m", 0.5), ("position_limit_min_m", -0.5)):
+                      (("sound", SOUND), ("wrong", WRONG), ("silent", SOUND), ("interrupted", SOUND), ("asked", SOUND), ("full", SOUND))}
+        for name, value in (("position_limit_max_m", 0.3), ("position_limit_min_m", -0.3)):
             commanded(cls.station, "set_parameter", "sound", name=name, value=value, confirm=True)
         cls.answers = {"sound": ANSWERS, "wrong": ANSWERS | {"direction": "backwards"}}
         cls.begun = {robot: begin(cls.place, robot, answers, 0) for robot, answers in cls.answers.items()}
@@ -99,7 +101,10 @@ class CommissionTest(unittest.TestCase):
         self.assertLessEqual({verdicts[step] for step in busy}, {"pass", "attention"})
         gain = next(f["figures"]["gain_m_s"] for f in record["findings"] if f["step"] == "motor_constant")
         self.assertAlmostEqual(gain, 0.1, delta=0.015)  # of equation (29)
-        self.assertEqual((status, record["signed_by"]), (0, "Ann"))
+        self.assertEqual((status, record["signed_by"], record["not_marked"]), (0, "Ann", None))
+        self.assertIn("--yes", record["confirmed_by"])
+        self.assertIn("direction", record["answers_given_beforehand"])
+        self.assertIn("zero its position", record["findings"][-1]["what_to_do"])
         folder, = into.glob("commission-sound-*")
         self.assertEqual(str(folder), record["folder"])
         subprocess.run(["sha256sum", "--check", "--quiet", "SHA256SUMS"], cwd=folder, check=True)
@@ -157,7 +162,15 @@ class CommissionTest(unittest.TestCase):
         process.send_signal(signal.SIGINT)
         record, said = end(process, into)
         self.assertEqual(process.returncode, 5)
-        self.assertIn("The robot is stopped: it confirmed after", said)
+        self.assertLess(said.index("Ended: interrupted by a signal"),
+                        said.index("The robot is stopped: it confirmed after"))
+        self.assertIn("THE MOTOR RUNS NOW", said)
+        self.assertNotIn("Watch it", said)
+        experiments = self.station.get("/api/v1/experiments?robot_id=interrupted")["experiments"]
+        self.assertEqual([(one["name"], one["state"]) for one in experiments][:2],
+                         [("Commissioning: pushes", "aborted"), ("Commissioning: at rest", "done")])
+        self.assertEqual(len(record["runs"]), 1)
+        self.assertIsNone(self.station.robot("interrupted")["control"])
         self.assertIn("interrupted by a signal", record["unsigned_because"])
         self.assertEqual(verdicts_of(record)["imu_noise"], "pass")
         self.assertEqual(verdicts_of(record)["free_travel"], "not_done")
@@ -172,20 +185,45 @@ class CommissionTest(unittest.TestCase):
         without = self.place.tool("robot", "commission", "asked", "--data", self.place.data, "--into", self.place.folder)
         self.assertEqual(without.returncode, 2)
         self.assertIn("no answer to free_ahead_m", without.stderr)
-        for typed, status, expected in (("0.1\n0.1\n", 1, "are needed ahead and behind"),
-                                        ("far\n0.6\n0.6\nno\n", 5, "the person did not go on")):
-            ours, theirs = pty.openpty()
-            self.addCleanup(os.close, ours)
-            process = subprocess.Popen([str(BIN / "rheonaut"), "robot", "commission", "asked", "--data",
-                                        str(self.place.data), "--into", str(self.place.folder)], stdin=theirs,
-                                       stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+        said, status, _ = self.typed("0.1\n0.1\n", None)
+        self.assertIn("are needed ahead and behind", said)
+        self.assertEqual(status, 1)
+        self.assertIsNone(self.station.robot("asked")["control"])
+        # What was typed before a question of safety does not answer it.
+        said, status, _ = self.typed("far\n0.6\n0.6\nyes\n", "no\n")
+        self.assertIn("A number of metres", said)
+        self.assertIn("the person did not go on", said)
+        self.assertNotIn("stop_latency: ", said)
+        self.assertEqual(status, 5)
+        self.assertIsNone(self.station.robot("asked")["control"])
+
+    def test_a_record_that_cannot_be_written_is_printed(self):
+        said, status, printed = self.typed("0.6\n0.6\n", "no\n", "full", keeps_folder=False)
+        self.assertEqual(status, 5)
+        self.assertIn("could not be written", said)
+        record = json.loads(printed)
+        self.assertEqual(verdicts_of(record)["versions"], "pass")
+        self.assertIn("it could not be written", record["unsigned_because"])
+
+    def typed(self, first, then, robot="asked", keeps_folder=True):
+        """What a commissioning on a terminal says, its exit status, and its output; `then` answers the first confirmation."""
+        ours, theirs = pty.openpty()
+        self.addCleanup(os.close, ours)
+        into = pathlib.Path(tempfile.mkdtemp(dir=self.place.folder))
+        with open(self.place.folder / f"{into.name}.said", "w+") as said:
+            process = subprocess.Popen([str(BIN / "rheonaut"), "robot", "commission", robot, "--data",
+                                        str(self.place.data), "--into", str(into)], stdin=theirs,
+                                       stdout=subprocess.PIPE, stderr=said, text=True)
             self.place.processes.append(process)
             os.close(theirs)
-            os.write(ours, typed.encode())
-            said = process.communicate(timeout=60)[0]
-            self.assertEqual(process.returncode, status, said)
-            self.assertIn(expected, said)
-        self.assertIn("A number of metres", said)
+            os.write(ours, first.encode())
+            if then:
+                wait_until(lambda: "Begin with 10" in pathlib.Path(said.name).read_text(), 60, "the first confirmation")
+                if not keeps_folder:
+                    into.rmdir()
+                os.write(ours, then.encode())
+            printed = process.communicate(timeout=120)[0]
+            return pathlib.Path(said.name).read_text(), process.returncode, printed
 
 
 if __name__ == "__main__":

@@ -85,7 +85,8 @@ void add_options(CLI::App& command, Commission& options) {
   command.footer(
       "The stops come first, with the motor off; the motor then gets small duties for\n"
       "short times. Ctrl-C ends it with an emergency stop. It always begins anew.\n"
-      "Exit status 5: the record is not signed, since a step failed or was left out.\n"
+      "Exit status 5: the record is not signed, or could not be written: it is then\n"
+      "printed as JSON.\n"
       "Example: rheonaut robot commission rheo-1 --data lab");
 }
 
@@ -106,19 +107,28 @@ int run(const Commission& options, std::ostream& out) {
     throw std::runtime_error{"ended before anything was done to the robot"};
   }
   record.ended_at_us = now_us();
+  record.is_confirmed_beforehand = person.says_yes();
+  record.prepared = person.prepared();
   sign(record, person);
   record.answers = person.given();
-  const WrittenRecord written = write(record, options.into);
+  WrittenRecord written;
+  try {
+    written = write(record, options.into);
+  } catch (const std::exception& error) {
+    // What was found is not lost with the disk.
+    record.signed_by.clear();
+    record.unsigned_because = fmt::format("it could not be written: {}", error.what());
+    person.tell("The record could not be written: keep what is printed here.");
+    write_json(out, document_of(record));
+    return kNotSigned;
+  }
   std::string not_marked;
   if (!record.signed_by.empty()) {
     not_marked = robot.mark(fmt::format("commissioned ({}), signed by {}, record sha256 {}", outcome_of(record),
                                         record.signed_by, written.sha256));
   }
   if (options.form.is_json) {
-    nlohmann::ordered_json answer = document_of(record);
-    answer["folder"] = written.folder.string();
-    answer["sha256"] = written.sha256;
-    write_json(out, answer);
+    write_json(out, printed_of(record, written, not_marked));
   } else {
     write_as_text(out, record, written, not_marked);
   }

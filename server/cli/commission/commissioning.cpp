@@ -33,6 +33,25 @@ std::string lost_text(const StopAnswer& stop) {
              : "THE STOP IS NOT CONFIRMED: " + stop.why + ". SWITCH THE ROBOT OFF BY HAND.";
 }
 
+// Control of the robot, given back whatever happens.
+class Control {
+ public:
+  explicit Control(const RobotAccess& robot) : robot_{robot} {
+    try {
+      robot.take_control();
+    } catch (...) {  // Ctrl-C, or an answer that is lost: it may have been given
+      robot.release_control();
+      throw;
+    }
+  }
+  ~Control() { robot_.release_control(); }
+  Control(const Control&) = delete;
+  Control& operator=(const Control&) = delete;
+
+ private:
+  const RobotAccess& robot_;
+};
+
 }  // namespace
 
 void Commissioning::add(StepFinding finding) {
@@ -55,7 +74,6 @@ void Commissioning::look_at_robot() {
   }
   if (controller.is_null()) throw std::runtime_error{"the robot has not reported its controller yet; try again"};
   parameters_ = robot_.parameters();
-  robot_.take_control();
   travel_.duty_max = value_of(controller, "duty_max", 1);
   plan_.is_one_way = value_of(controller, "duty_min", -1) >= 0;
   travel_.limit_min_m = value_of(parameters_, "position_limit_min_m", travel_.limit_min_m);
@@ -127,6 +145,11 @@ void Commissioning::prove_stops() {
 RecordedRun Commissioning::record_run(const json& profile) {
   RecordedRun run = robot_.perform(profile);
   record_.runs.push_back(run.reference);
+  if (run.samples.empty()) throw std::runtime_error{"no samples of the run came: see to the link"};
+  // Each run begins with a new zero, where the one before has ended.
+  travel_.zero_m += last_end_.position_m;
+  travel_.zero_sd_m += last_end_.position_sd_m;
+  last_end_ = run.samples.back();
   return run;
 }
 
@@ -153,6 +176,7 @@ void Commissioning::push() {
                   smallest_duty(plan_), plan_.largest_duty, duration_of(profile)));
   dead_zone_.is_one_way = plan_.is_one_way;
   dead_zone_.parameter = value_of(parameters_, "dead_zone_duty", 0);
+  dead_zone_.tried = duties_in(profile);
   dead_zone_.responses = responses_of(record_run(profile).samples, sd_of(rest_.acceleration_m_s2));
   if (plan_.is_one_way) dead_zone_.has_refused_backwards = robot_.refuses_duty(-smallest_duty(plan_));
 }
@@ -168,29 +192,33 @@ void Commissioning::find_direction() {
   for (const Response& one : responses_of(run.samples, sd_of(rest_.acceleration_m_s2))) {
     if (one.duty > 0) direction_.response = one;
   }
-  if (direction_.response.edges == 0) throw std::runtime_error{"samples of the push are missing: see to the link"};
   travel_.believed_m = run.samples.back().position_m;
   travel_.believed_sd_m = run.samples.back().position_sd_m;
   travel_.measured_m = person_.maybe_length_m(
-      "moved_m", "How far did it move in all, by your ruler, in m, forwards positive? (Enter: not measured)");
+      "moved_m",
+      "How far did it move in this one push, from where it lay before it, by your ruler, in m, forwards positive? "
+      "(Enter: not measured)");
+  direction_.is_noise_sound = judge_imu_noise(rest_).verdict != Verdict::fail;
   add(judge_motor_direction(direction_));
   add(judge_imu_axis(direction_));
 }
 
 void Commissioning::judge_pushes() {
-  if (direction_.person != SeenByPerson::nothing && !direction_.response.is_seen()) {
+  if (direction_.response.edges() > 0 && direction_.person != SeenByPerson::nothing && !direction_.response.is_seen()) {
     return add(not_done("dead_zone", "the accelerometer sees no motion: its axis comes first"));
   }
   add(judge_dead_zone(dead_zone_));
 }
 
 void Commissioning::find_motor_constant() {
-  const auto is_fail = [](const StepFinding& one) {
-    return one.verdict != Verdict::pass && (one.step == "motor_direction" || one.step == "imu_axis");
+  // SAFETY: the steps go there and back, so only after the pushes have shown that the reverse reverses.
+  const auto is_in_the_way = [](const StepFinding& one) {
+    const bool is_wrong = one.verdict == Verdict::fail || one.verdict == Verdict::not_done;
+    return is_wrong && (one.step == "motor_direction" || one.step == "imu_axis" || one.step == "dead_zone");
   };
-  if (std::ranges::any_of(record_.findings, is_fail)) {
+  if (std::ranges::any_of(record_.findings, is_in_the_way)) {
     return add(
-        not_done("motor_constant", "it means nothing before the motor's direction and the sensor's axis are right"));
+        not_done("motor_constant", "it means nothing before the motor's directions and the sensor's axis are right"));
   }
   person_.confirm(fmt::format("The last motion: four steps of duty {:.2f} for 1 s, {}. Is the way free?",
                               plan_.largest_duty, plan_.is_one_way ? "forwards" : "there and back"));
@@ -232,6 +260,7 @@ void Commissioning::perform() {
 void Commissioning::run() {
   look_at_robot();
   ask_for_room();
+  const Control control{robot_};
   try {
     perform();
   } catch (const Interrupted&) {
@@ -242,7 +271,6 @@ void Commissioning::run() {
     end_early(error.what());
   }
   complete();
-  robot_.release_control();
 }
 
 }  // namespace server::cli

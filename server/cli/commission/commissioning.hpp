@@ -17,6 +17,7 @@
 #include "server/cli/commission/record.hpp"
 #include "server/cli/commission/robot_access.hpp"
 #include "server/cli/commission/standstill.hpp"
+#include "server/cli/commission/travel.hpp"
 
 namespace server::cli {
 
@@ -25,7 +26,8 @@ class Commissioning {
   Commissioning(RobotAccess& robot, Person& person, CommissionPlan plan, CommissionRecord& record)
       : robot_{robot}, person_{person}, plan_{plan}, record_{record} {}
 
-  // Fills the record. Throws std::runtime_error only before anything was done to the robot.
+  // Fills the record. Throws std::runtime_error only before anything was done to the robot. Control of the robot is
+  // taken once its way is known to be long enough, and given back at every end.
   void run();
 
  private:
@@ -57,6 +59,7 @@ class Commissioning {
   DirectionFacts direction_;
   MotorFacts motor_;
   TravelFacts travel_;
+  RecordedSample last_end_;  // of the run before
 };
 
 }  // namespace server::cli

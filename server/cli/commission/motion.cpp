@@ -16,6 +16,9 @@ using nlohmann::json;
 constexpr std::int64_t kTickUs = 10'000;
 constexpr double kTickS = 0.01;
 constexpr double kSeenSd = 4;  // of the noise
+// m/s per duty of the paper's slower fluid, (29), and the share of it that is reached within the window.
+constexpr double kSlowestMS = 0.1, kSlowestShare = 0.8;
+constexpr double kWellBelow = 4;  // so many times below it the noise has to lie before no motion is believed
 constexpr auto kWindow = static_cast<std::size_t>(kResponseWindowS / kTickS);
 
 constexpr const char* kSettings = "robot_fw/esp8266/settings.hpp";
@@ -56,7 +59,7 @@ nlohmann::ordered_json direction_figures(const DirectionFacts& facts) {
   return {{"duty", facts.response.duty},
           {"response_m_s", facts.response.velocity_m_s},
           {"response_sd_m_s", facts.response.sd_m_s},
-          {"edges", facts.response.edges},
+          {"edges", facts.response.edges()},
           {"person", word_of(facts.person)}};
 }
 
@@ -77,6 +80,15 @@ Bracket bracket_of(std::vector<Response> responses, int direction) {
     bracket.moving = std::abs(one->duty);
   }
   return bracket;
+}
+
+// SAFETY: of the same duty both ways the accelerometer saw motion one way.
+bool does_not_reverse(const std::vector<Response>& responses) {
+  return std::ranges::any_of(responses, [&responses](const Response& forwards) {
+    return std::ranges::any_of(responses, [&forwards](const Response& backwards) {
+      return forwards.duty > 0 && backwards.duty == -forwards.duty && sign_of(forwards) * sign_of(backwards) < 0;
+    });
+  });
 }
 
 std::string bracket_text(const Bracket& bracket) {
@@ -134,25 +146,30 @@ double correlation_of(const json& fit) {
 
 }  // namespace
 
-bool Response::is_seen() const { return edges > 0 && std::abs(velocity_m_s) > kSeenSd * sd_m_s; }
+bool Response::is_seen() const { return edges() > 0 && std::abs(velocity_m_s) > kSeenSd * sd_m_s; }
 
 std::vector<Response> responses_of(const std::vector<RecordedSample>& samples, double noise_m_s2) {
-  std::map<long, std::vector<double>> changes;  // by the duty in hundredths of a percent
+  struct Changes {
+    double sum_m_s = 0;
+    std::size_t rising = 0, falling = 0;
+  };
+  std::map<long, Changes> changes;  // by the duty in hundredths of a percent
   constexpr double kDutySteps = 1e4;
   for (std::size_t i = 1; i < samples.size(); ++i) {
     const double before = samples[i - 1].duty, after = samples[i].duty;
     if (before == after || (before != 0 && after != 0)) continue;
     const auto change = change_after(samples, i);
     if (!change) continue;
-    changes[std::lround(kDutySteps * (before + after))].push_back(after == 0 ? -*change : *change);
+    Changes& of_duty = changes[std::lround(kDutySteps * (before + after))];
+    of_duty.sum_m_s += after == 0 ? -*change : *change;
+    ++(after == 0 ? of_duty.falling : of_duty.rising);
   }
   std::vector<Response> responses;
   for (const auto& [duty, seen] : changes) {
-    double sum = 0;
-    for (const double one : seen) sum += one;
-    const auto count = static_cast<double>(seen.size());
-    responses.push_back({static_cast<double>(duty) / kDutySteps, sum / count,
-                         noise_m_s2 * kTickS * std::sqrt(static_cast<double>(kWindow) / count), seen.size()});
+    const auto count = static_cast<double>(seen.rising + seen.falling);
+    responses.push_back({static_cast<double>(duty) / kDutySteps, seen.sum_m_s / count,
+                         noise_m_s2 * kTickS * std::sqrt(static_cast<double>(kWindow) / count), seen.rising,
+                         seen.falling});
   }
   return responses;
 }
@@ -185,10 +202,23 @@ StepFinding judge_imu_axis(const DirectionFacts& facts) {
                       .found = "the accelerometer saw " + response_text(facts.response),
                       .bound = "the sign of the motion that the person saw, beyond 4 sd of its noise"};
   finding.figures = direction_figures(facts);
+  const auto unknown = [&finding](const char* why, const char* action) {
+    StepFinding left_out = not_done("imu_axis", why);
+    left_out.action = action;
+    left_out.figures = finding.figures;
+    return left_out;
+  };
   if (facts.person == SeenByPerson::nothing) {
-    StepFinding unknown = not_done("imu_axis", "without a motion that the person saw nothing can be said of the axis");
-    unknown.figures = finding.figures;
-    return unknown;
+    return unknown("without a motion that the person saw nothing can be said of the axis", "");
+  }
+  // With as many edges of both kinds an error of the bias cancels; with one more it looks like motion.
+  if (facts.response.edges() == 0 || facts.response.rising != facts.response.falling) {
+    return unknown("samples are missing where the duty changed", "see to the link, and push again");
+  }
+  const double slowest_m_s = kSlowestShare * kSlowestMS * std::abs(facts.response.duty);
+  const bool hides = !facts.is_noise_sound || kWellBelow * kSeenSd * facts.response.sd_m_s > slowest_m_s;
+  if (hides && !facts.response.is_seen()) {
+    return unknown("the noise hides it", "see to the noise (imu_noise), or allow more with --duty");
   }
   const int seen = sign_of(facts.response), moved = facts.person == SeenByPerson::forwards ? 1 : -1;
   if (seen == 0) {
@@ -218,7 +248,7 @@ StepFinding judge_dead_zone(const DeadZoneFacts& facts) {
     responses.push_back({{"duty", one.duty},
                          {"velocity_m_s", one.velocity_m_s},
                          {"sd_m_s", one.sd_m_s},
-                         {"edges", one.edges},
+                         {"edges", one.edges()},
                          {"seen", one.is_seen()}});
   }
   finding.figures = {{"forwards", bracket_json(forwards)},
@@ -226,11 +256,28 @@ StepFinding judge_dead_zone(const DeadZoneFacts& facts) {
                      {"one_way", facts.is_one_way},
                      {"dead_zone_duty", facts.parameter},
                      {"responses", responses}};
+  if (facts.responses.size() < facts.tried) {
+    finding.verdict = Verdict::not_done;
+    finding.found =
+        fmt::format("samples are missing: {} of {} duties can be judged", facts.responses.size(), facts.tried);
+    finding.action = "see to the link, and push again";
+    return finding;
+  }
+  if (facts.is_one_way && !facts.has_refused_backwards) {
+    finding.verdict = Verdict::not_done;
+    finding.found += ", but the robot itself was not asked for a duty below 0: the station let none through";
+    finding.action = "see whether the station's own limits (duty_min) or another command stood in the way";
+    return finding;
+  }
   const double still = std::max(forwards.still.value_or(0), facts.is_one_way ? 0 : backwards.still.value_or(0));
   if (!forwards.moving || (!facts.is_one_way && !backwards.moving)) {
     finding.verdict = Verdict::fail;
     finding.action = "the accelerometer saw no motion: see whether the propeller turns, or allow more duty (--duty)";
-  } else if (facts.is_one_way && !facts.has_refused_backwards) {
+  } else if (!facts.is_one_way && does_not_reverse(facts.responses)) {
+    finding.verdict = Verdict::fail;
+    finding.found += ", but the reverse does not reverse: a duty below 0 drives it as one above 0 does";
+    finding.action = "see to the wire of `direction_pin` and to the driver (docs/hardware.md, Wiring)";
+  } else if (facts.is_one_way && !*facts.has_refused_backwards) {
     finding.verdict = Verdict::fail;
     finding.found += ", but the robot did not refuse a duty below 0";
     finding.action = "see to `direction_pin` and the duty range in robot_fw/esp8266/settings.hpp";
@@ -298,50 +345,6 @@ StepFinding judge_motor_constant(const MotorFacts& facts) {
     finding.action =
         "take it for a first figure: a fluid with orders of its own needs `identification_set` "
         "(docs/first_robot.md, step 5)";
-  }
-  return finding;
-}
-
-StepFinding judge_free_travel(const TravelFacts& facts) {
-  const double stop_m = facts.gain_m_s.value_or(0) * facts.duty_max * facts.worst_stop_ms / 1e3;
-  StepFinding finding{
-      .step = "free_travel",
-      .verdict = Verdict::pass,
-      .found = fmt::format("free {:.3f} m ahead and {:.3f} m behind by ruler; the robot's limits {:+.2f} and {:+.2f} m",
-                           facts.ahead_m, facts.behind_m, facts.limit_max_m, facts.limit_min_m),
-      .bound = "the robot's own limits lie within the free length, by the way that it swims until a stop arrives"};
-  finding.figures = {{"ahead_m", facts.ahead_m},
-                     {"behind_m", facts.behind_m},
-                     {"position_limit_min_m", facts.limit_min_m},
-                     {"position_limit_max_m", facts.limit_max_m},
-                     {"believed_m", facts.believed_m},
-                     {"believed_sd_m", facts.believed_sd_m},
-                     {"measured_m", facts.measured_m ? nlohmann::ordered_json(*facts.measured_m) : nullptr},
-                     {"stop_way_m", facts.gain_m_s ? nlohmann::ordered_json(stop_m) : nullptr}};
-  if (facts.gain_m_s) {
-    finding.found += fmt::format("; at full duty it swims {:.0f} mm until the slowest stop arrives", 1e3 * stop_m);
-  }
-  finding.found += fmt::format("; after the push it believed {:+.0f} ± {:.0f} mm (2 sd)", 1e3 * facts.believed_m,
-                               2e3 * facts.believed_sd_m);
-  const double wrong_m = facts.measured_m ? *facts.measured_m - facts.believed_m : 0;
-  if (facts.measured_m) finding.found += fmt::format(", by ruler it moved {:+.0f} mm", 1e3 * *facts.measured_m);
-  const bool is_within = facts.limit_max_m + stop_m <= facts.ahead_m && facts.limit_min_m - stop_m >= -facts.behind_m;
-  constexpr double kRulerM = 0.002;  // what a ruler may be wrong by
-  if (!is_within) {
-    constexpr double kWellWithin = 0.8;  // of the free way
-    const auto rounded_m = [stop_m](double free_m) {
-      return std::max(0.01, std::floor(100 * (kWellWithin * free_m - stop_m)) / 100);
-    };
-    finding.verdict = Verdict::attention;
-    finding.action = fmt::format(
-        "put it back to the start, zero its position, and set position_limit_max_m={:.2f} and "
-        "position_limit_min_m={:.2f} (rheonaut robot parameters, with --confirm)",
-        rounded_m(facts.ahead_m), -rounded_m(facts.behind_m));
-  } else if (std::abs(wrong_m) > 2 * facts.believed_sd_m + kRulerM) {
-    finding.verdict = Verdict::attention;
-    finding.action =
-        "the robot believes a wrong way: give it a model of this fluid before anything relies on its position "
-        "(docs/first_robot.md, steps 5 and 6)";
   }
   return finding;
 }

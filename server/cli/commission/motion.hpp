@@ -1,5 +1,5 @@
 // What is found while the motor runs: how the accelerometer answers a duty, the motor's direction, the sensor's axis,
-// the dead zone, the motor constant, the free travel. Facts in, a finding out: nothing here asks a robot.
+// the dead zone, the motor constant. Facts in, a finding out: nothing here asks a robot.
 //
 // An edge is a change of the duty between 0 and u. The sum of the acceleration over the window that follows is the
 // change of the velocity that the sensor saw; after an edge to 0 its sign is turned round. The mean over the edges of
@@ -34,7 +34,8 @@ struct RecordedSample {
 struct Response {
   double duty = 0;
   double velocity_m_s = 0, sd_m_s = 0;
-  std::size_t edges = 0;
+  std::size_t rising = 0, falling = 0;  // edges
+  std::size_t edges() const { return rising + falling; }
   bool is_seen() const;  // beyond the noise
 };
 
@@ -48,15 +49,17 @@ enum class SeenByPerson : std::uint8_t { forwards, backwards, nothing };
 struct DirectionFacts {
   Response response;  // to a duty above 0
   SeenByPerson person = SeenByPerson::nothing;
+  bool is_noise_sound = true;  // imu_noise did not fail
 };
 StepFinding judge_motor_direction(const DirectionFacts& facts);
 StepFinding judge_imu_axis(const DirectionFacts& facts);
 
 struct DeadZoneFacts {
   std::vector<Response> responses;
-  bool is_one_way = false;             // the motor runs forwards alone
-  bool has_refused_backwards = false;  // and the robot refused a duty below 0
-  double parameter = 0;                // dead_zone_duty of the robot
+  std::size_t tried = 0;                        // duties
+  bool is_one_way = false;                      // the motor runs forwards alone
+  std::optional<bool> has_refused_backwards{};  // and the robot refused a duty below 0; none: it was not asked
+  double parameter = 0;                         // dead_zone_duty of the robot
 };
 StepFinding judge_dead_zone(const DeadZoneFacts& facts);
 
@@ -66,15 +69,5 @@ struct MotorFacts {
 };
 StepFinding judge_motor_constant(const MotorFacts& facts);
 std::optional<double> gain_of(const MotorFacts& facts);  // m/s per duty
-
-struct TravelFacts {
-  double ahead_m = 0, behind_m = 0;              // free, by the person's ruler, from where the robot lay
-  double limit_min_m = -100, limit_max_m = 100;  // the robot's parameters
-  double believed_m = 0, believed_sd_m = 0;      // after the push that the person watched
-  std::optional<double> measured_m{};            // the same by the ruler
-  std::optional<double> gain_m_s{};              // per duty
-  double duty_max = 1, worst_stop_ms = 0;
-};
-StepFinding judge_free_travel(const TravelFacts& facts);
 
 }  // namespace server::cli

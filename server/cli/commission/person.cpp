@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 #include <poll.h>
+#include <termios.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -35,6 +36,11 @@ std::optional<double> number_of(const std::string& line) {
   return value;
 }
 
+void say(const std::string& text) {
+  std::fwrite(text.data(), 1, text.size(), stderr);
+  std::fflush(stderr);
+}
+
 void check_answer(const std::string& name, const json& answer) {
   const auto refuse = [&name, &answer](const std::string& what) {
     throw UsageError{fmt::format("answers: {} must be {}, is {}", name, what, answer.dump())};
@@ -60,6 +66,7 @@ void check_answer(const std::string& name, const json& answer) {
 }  // namespace
 
 Interruption::Interruption() : signals_{loop_, SIGINT, SIGTERM, SIGHUP} {
+  std::signal(SIGPIPE, SIG_IGN);
   signals_.async_wait([this](const boost::system::error_code& error, int) { has_come_ = !error; });
 }
 
@@ -93,14 +100,16 @@ void Person::must_answer(const std::vector<std::string>& questions) const {
                                fmt::join(missing, ", "))};
 }
 
-void Person::tell(const std::string& line) const {
-  fmt::print(stderr, "{}\n", line);
-  std::fflush(stderr);
+void Person::tell(const std::string& line) const { say(line + "\n"); }
+
+std::vector<std::string> Person::prepared() const {
+  std::vector<std::string> names;
+  for (const auto& [name, answer] : answers_.items()) names.push_back(name);
+  return names;
 }
 
 std::string Person::asked(const std::string& question) {
-  fmt::print(stderr, "{} ", question);
-  std::fflush(stderr);
+  say(question + " ");
   std::string line;
   for (;;) {
     interruption_.throw_if_come();
@@ -119,6 +128,7 @@ void Person::confirm(const std::string& what) {
   interruption_.throw_if_come();
   if (says_yes_) return tell(what + " [yes, by --yes]");
   for (;;) {
+    if (has_terminal_) ::tcflush(STDIN_FILENO, TCIFLUSH);
     const std::string answer = asked(what + " [yes/no]");
     if (answer == "yes" || answer == "y") return;
     if (answer == "no" || answer == "n") throw Declined{};

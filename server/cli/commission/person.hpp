@@ -20,6 +20,7 @@ struct Declined {};
 // Notices Ctrl-C (and SIGTERM, SIGHUP) in its waits, which then throw Interrupted; later signals change nothing.
 class Interruption {
  public:
+  // SIGPIPE is ignored from now on: a reader that is gone must not end the program before the robot is stopped.
   Interruption();
   void throw_if_come() { wait(std::chrono::milliseconds{0}); }
   void wait(std::chrono::milliseconds time);
@@ -41,14 +42,17 @@ class Person {
   // Throws UsageError that names the questions for which there is no answer and no terminal.
   void must_answer(const std::vector<std::string>& questions) const;
 
-  void tell(const std::string& line) const;
-  void confirm(const std::string& what);  // throws Declined
+  void tell(const std::string& line) const;  // never throws: a closed terminal changes nothing
+  // SAFETY: what was typed before the question does not answer it. Throws Declined.
+  void confirm(const std::string& what);
   double length_m(const std::string& name, const std::string& question);
   std::optional<double> maybe_length_m(const std::string& name, const std::string& question);
   std::string word(const std::string& name, const std::string& question, const std::vector<std::string>& allowed);
   std::string text(const std::string& name, const std::string& question);  // "": no answer
 
   const nlohmann::ordered_json& given() const { return given_; }  // what was answered, by name
+  bool says_yes() const { return says_yes_; }
+  std::vector<std::string> prepared() const;  // names of the answers that were given beforehand
 
  private:
   std::string asked(const std::string& question);

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <set>
 #include <utility>
 
 namespace server::cli {
@@ -32,12 +33,12 @@ json profile_of(const char* name, const char* purpose, double largest_duty, json
           {"step", std::move(steps)}};
 }
 
-// SAFETY: of all the time at a duty, as if every push went the same way.
-double way_of(const json& profile, bool counts_both_ways) {
+// SAFETY: of all the time at a duty, as if every push went the same way while nobody knows that the reverse reverses.
+double way_of(const json& profile, bool is_reverse_known) {
   double way_s = 0, farthest_s = 0;
   for (const json& step : profile.at("step")) {
     const double duty = step.value("duty", 0.0);
-    way_s += (counts_both_ways ? duty : std::abs(duty)) * step.at("for_s").get<double>();
+    way_s += (is_reverse_known ? duty : std::abs(duty)) * step.at("for_s").get<double>();
     farthest_s = std::max(farthest_s, std::abs(way_s));
   }
   return kFastestMS * farthest_s;
@@ -89,12 +90,17 @@ double duration_of(const json& profile) {
   return sum_s;
 }
 
+std::size_t duties_in(const json& profile) {
+  std::set<double> duties;
+  for (const json& step : profile.at("step")) duties.insert(step.value("duty", 0.0));
+  duties.erase(0.0);
+  return duties.size();
+}
+
 double needed_m(const CommissionPlan& plan) {
-  double sum_m = 0;
-  for (const json& profile : {pushes_profile(plan), direction_profile(plan), steps_profile(plan)}) {
-    sum_m += way_of(profile, !plan.is_one_way);
-  }
-  return sum_m;
+  // The steps come only after the pushes have shown the reverse.
+  return way_of(pushes_profile(plan), false) + way_of(direction_profile(plan), false) +
+         way_of(steps_profile(plan), !plan.is_one_way);
 }
 
 std::vector<std::string> words_of(const CommissionPlan& plan) {
@@ -102,8 +108,11 @@ std::vector<std::string> words_of(const CommissionPlan& plan) {
   return {
       fmt::format("1  {} emergency stops with the motor off, each confirmed by the robot and reset", kStops),
       fmt::format("2  at rest for {:.0f} s: accelerometer and electrode", kRestS),
-      fmt::format("3  pushes of {:.1f} s {}, duty {:.2f} to {:.2f}: {:.0f} s", kPushS, ways, smallest_duty(plan),
-                  plan.largest_duty, duration_of(pushes_profile(plan))),
+      fmt::format("3  pushes of {:.1f} s {}, duty {:.2f} to {:.2f}: {:.0f} s{}", kPushS, ways, smallest_duty(plan),
+                  plan.largest_duty, duration_of(pushes_profile(plan)),
+                  plan.is_one_way ? fmt::format("; then a duty of {:.2f} for 1 ms, which the robot must refuse",
+                                                -smallest_duty(plan))
+                                  : ""),
       fmt::format("4  one push forwards, duty {:.2f} for {:.0f} s: you watch which way it goes", direction_duty(plan),
                   kDirectionS),
       fmt::format("5  four steps of duty {:.2f} for {:.0f} s, {}: the motor constant", plan.largest_duty, kStepS,

@@ -33,9 +33,10 @@ nlohmann::json steps_profile(const CommissionPlan& plan);
 double smallest_duty(const CommissionPlan& plan);
 double direction_duty(const CommissionPlan& plan);
 
-double duration_of(const nlohmann::json& profile);  // s
-// The farthest from where it begins that a robot of kFastestMS comes with all profiles of the motor in a row, either
-// way.
+double duration_of(const nlohmann::json& profile);     // s
+std::size_t duties_in(const nlohmann::json& profile);  // different ones, other than 0
+// SAFETY: the farthest from where it begins that a robot of kFastestMS comes with all profiles of the motor in a row,
+// either way, and if its reverse drives it forwards: the pushes, which show that, count one way.
 double needed_m(const CommissionPlan& plan);
 
 // Lines for the person, before anything happens.

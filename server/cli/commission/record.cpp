@@ -35,6 +35,21 @@ std::string in_cell(std::string text) {
 
 std::string cell_of(const Json& value) { return value.is_string() ? value.get<std::string>() : value.dump(); }
 
+// Only of a simulated robot may be said beforehand what a person has to see.
+bool is_unwatched(const CommissionRecord& record) {
+  const bool is_simulated = record.subject.value("firmware_version", "").starts_with("sim-");
+  const bool has_direction = std::ranges::find(record.prepared, "direction") != record.prepared.end();
+  return !is_simulated && (record.is_confirmed_beforehand || has_direction);
+}
+
+const char* confirmed_by(const CommissionRecord& record) {
+  return record.is_confirmed_beforehand ? "nobody: --yes was given beforehand" : "a person, step by step";
+}
+
+std::string prepared_text(const CommissionRecord& record) {
+  return record.prepared.empty() ? "none" : fmt::format("{}", fmt::join(record.prepared, ", "));
+}
+
 void write_file(const std::filesystem::path& file, const std::string& content) {
   const storage::Draft part{std::filesystem::path{file}.concat(".part")};
   std::ofstream out{part.path(), std::ios::binary};
@@ -53,9 +68,14 @@ std::string unsigned_reason(const CommissionRecord& record) {
     if (one.verdict == Verdict::not_done) missing.push_back(one.step);
   }
   std::string reason;
-  if (!record.ended_by.empty()) reason = "it ended before its end: " + record.ended_by;
-  if (!failed.empty()) reason += fmt::format("{}failed: {}", reason.empty() ? "" : "; ", fmt::join(failed, ", "));
-  if (!missing.empty()) reason += fmt::format("{}not done: {}", reason.empty() ? "" : "; ", fmt::join(missing, ", "));
+  const auto add = [&reason](const std::string& more) { reason += (reason.empty() ? "" : "; ") + more; };
+  if (!record.ended_by.empty()) add("it ended before its end: " + record.ended_by);
+  if (!failed.empty()) add(fmt::format("failed: {}", fmt::join(failed, ", ")));
+  if (!missing.empty()) add(fmt::format("not done: {}", fmt::join(missing, ", ")));
+  for (const Json& run : record.runs) {
+    if (!run.value("sha256", Json()).is_string()) add(fmt::format("run {} has no digest", cell_of(run.at("run_id"))));
+  }
+  if (is_unwatched(record)) add("nobody watched it: --yes and a prepared `direction` are for simulated robots");
   return reason;
 }
 
@@ -77,7 +97,9 @@ Json document_of(const CommissionRecord& record) {
                 {"ended_at", moment_of(record.ended_at_us)},
                 {"subject", record.subject},
                 {"plan", record.plan},
-                {"answers", record.answers}};
+                {"confirmed_by", confirmed_by(record)},
+                {"answers", record.answers},
+                {"answers_given_beforehand", record.prepared}};
   document["findings"] = Json::array();
   for (const StepFinding& one : record.findings) {
     document["findings"].push_back({{"step", one.step},
@@ -96,6 +118,8 @@ std::string page_of(const CommissionRecord& record) {
   page += fmt::format("Outcome: **{}**. ", outcome_of(record));
   page += record.signed_by.empty() ? fmt::format("**Not signed**: {}.\n\n", record.unsigned_because)
                                    : fmt::format("Signed by {}.\n\n", record.signed_by);
+  page += fmt::format("Each step confirmed by {}. Answers given beforehand: {}.\n\n", confirmed_by(record),
+                      prepared_text(record));
   page += fmt::format("From {} to {} (UTC).\n\n| subject | |\n|---|---|\n", moment_of(record.begun_at_us),
                       moment_of(record.ended_at_us));
   for (const auto& [name, value] : record.subject.items()) {
@@ -126,13 +150,22 @@ void check_writable(const std::filesystem::path& where) {
                   where.string())};
 }
 
+Json printed_of(const CommissionRecord& record, const WrittenRecord& written, const std::string& not_marked) {
+  Json answer = document_of(record);
+  answer["folder"] = written.folder.string();
+  answer["sha256"] = written.sha256;
+  answer["not_marked"] = not_marked.empty() ? Json(nullptr) : Json(not_marked);
+  return answer;
+}
+
 WrittenRecord write(const CommissionRecord& record, const std::filesystem::path& where) {
   const std::filesystem::path folder =
       where / fmt::format("commission-{}-{:%Y%m%dT%H%M%SZ}", record.robot_id, utc_of(record.begun_at_us));
   if (::mkdir(folder.c_str(), 0755) != 0) {  // fails for one that exists
     throw std::runtime_error{fmt::format("cannot make the folder '{}': {}", folder.string(), std::strerror(errno))};
   }
-  const std::string json = document_of(record).dump(2) + "\n", page = page_of(record);
+  const std::string json = document_of(record).dump(2, ' ', false, Json::error_handler_t::replace) + "\n",
+                    page = page_of(record);
   const std::string sha256 = runtime::sha256_of(json);
   write_file(folder / "record.json", json);
   write_file(folder / "record.md", page);

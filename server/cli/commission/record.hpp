@@ -25,6 +25,8 @@ struct CommissionRecord {
   nlohmann::ordered_json subject = nlohmann::ordered_json::object();  // versions, boot, controller, parameters, fluid
   nlohmann::ordered_json plan = nlohmann::ordered_json::object();
   nlohmann::ordered_json answers = nlohmann::ordered_json::object();
+  bool is_confirmed_beforehand = false;  // by --yes: nobody said that the way was free
+  std::vector<std::string> prepared;     // names of the answers that were given beforehand
   std::vector<StepFinding> findings;
   std::vector<nlohmann::ordered_json> runs;
   std::string signed_by;         // empty: nobody
@@ -32,7 +34,8 @@ struct CommissionRecord {
   std::string ended_by;          // what ended it before its end; empty: it came to its end
 };
 
-// Why the record must stay unsigned: what failed or was not done; empty: nothing.
+// Why the record must stay unsigned: what failed or was not done, a run without a digest, or a real robot that nobody
+// watched; empty: nothing.
 std::string unsigned_reason(const CommissionRecord& record);
 
 const char* outcome_of(const CommissionRecord& record);  // "passed", "passed_with_attention", "not_passed"
@@ -44,6 +47,10 @@ struct WrittenRecord {
   std::filesystem::path folder;
   std::string sha256;  // of record.json
 };
+// The record as `--json` prints it. `not_marked`: why the station has no marker of it; empty: it has, or needs none.
+nlohmann::ordered_json printed_of(const CommissionRecord& record, const WrittenRecord& written,
+                                  const std::string& not_marked);
+
 WrittenRecord write(const CommissionRecord& record, const std::filesystem::path& where);
 
 // Throws std::runtime_error when no folder can be made there.

@@ -43,11 +43,12 @@ class RobotAccess {
   nlohmann::json parameters() const;
 
   void take_control() const;
-  void release_control() const;  // never throws
+  void release_control() const noexcept;
 
   // SAFETY: takes at most 7 s, whatever the station does; never throws.
   StopAnswer stop() const;
-  // The stop first, then the end of an experiment that perform() left behind. Never throws.
+  // The stop first, then the end of what perform() left behind, also of an experiment whose request may have arrived
+  // without an answer. Never throws.
   StopAnswer stop_and_end();
   // Waits until the robot is seen in emergency at duty 0, then resets this stop and waits for that too.
   void reset(const std::string& emergency_id) const;
@@ -55,7 +56,7 @@ class RobotAccess {
   // Gives signs of life while it lasts: when they end, the robot stops. Throws when it does not begin within 20 s, or
   // does not end as planned.
   RecordedRun perform(const nlohmann::json& profile);
-  bool refuses_duty(double duty) const;                                 // a command for 1 ms
+  std::optional<bool> refuses_duty(double duty) const;  // a command for 1 ms; none: it did not reach the robot
   nlohmann::json fit(std::int64_t run_id, std::string& failure) const;  // null, with the reason
   // A line of the station's own record; the reason when it is not stored, else empty.
   std::string mark(const std::string& line) const;
@@ -66,6 +67,7 @@ class RobotAccess {
   nlohmann::json post(const std::string& target, const nlohmann::json& body) const {
     return asked(ask("POST", target, body));
   }
+  void abort_own_experiments() const;
   std::vector<RecordedSample> samples_of(std::int64_t run_id) const;
   nlohmann::ordered_json reference_of(std::int64_t run_id, const std::string& purpose) const;
 
@@ -73,7 +75,12 @@ class RobotAccess {
   std::string path_;
   std::string robot_id_;
   Interruption& interruption_;
-  std::optional<std::int64_t> open_experiment_;
+  std::string notes_;            // of its experiments, by which it knows them again
+  bool has_experiment_ = false;  // one may be open
 };
+
+// What the answer to a command of a duty says: true, the robot itself refused it as out of its range; false, it took
+// it; none: anything else.
+std::optional<bool> refused_by_robot(const StationAnswer& answer);
 
 }  // namespace server::cli

@@ -58,13 +58,18 @@ StepFinding judge_versions(const VersionFacts& facts) {
                      {"program_version", facts.program},
                      {"reset_cause", facts.reset_cause},
                      {"imu_calibration", facts.has_status ? nlohmann::ordered_json(facts.imu_calibration) : nullptr}};
-  if (!facts.firmware.ends_with(facts.station)) {
+  const std::string version = facts.firmware.substr(facts.firmware.rfind('-') + 1);  // all of it where there is no '-'
+  if (version != facts.station) {
     finding.verdict = Verdict::attention;
     finding.action = "flash the robot with the firmware that belongs to this station (docs/hardware.md, Flashing)";
   } else if (facts.reset_cause == "watchdog" || facts.reset_cause == "brown_out") {
     finding.verdict = Verdict::attention;
     finding.action = "find out why the robot reset by itself: a weak battery, or a program that hung";
-  } else if (facts.has_status && facts.imu_calibration < 3) {
+  } else if (!facts.has_status) {
+    finding.verdict = Verdict::attention;
+    finding.found += "; the sensor's calibration is not known";
+    finding.action = "the robot has sent no status: see to the link, and begin again";
+  } else if (facts.imu_calibration < 3) {
     finding.verdict = Verdict::attention;
     finding.found += fmt::format("; the sensor's calibration is {} of 3", facts.imu_calibration);
     finding.action = "calibrate the sensor (docs/hardware.md, Calibration), and begin again";

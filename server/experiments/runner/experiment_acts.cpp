@@ -77,6 +77,8 @@ Result<void> Experiments::check_request(const storage::ExperimentRequest& reques
 asio::awaitable<Result<ExperimentView>> Experiments::begin(storage::ExperimentRequest request, station::Author by) {
   if (auto allowed = check_request(request); !allowed) co_return std::unexpected{allowed.error()};
   const runtime::Counted one_more{being_added_};
+  const station::RobotId robot_id = request.robot_id;
+  const std::uint64_t stops_before = stops_[robot_id];
   auto job = [document = request.profile, envelope = parts_.station.envelope(),
               fluid = parts_.station.find(request.robot_id)->fluid] { return prepare(document, envelope, fluid); };
   auto prepared = co_await maths_.run(std::move(job));
@@ -116,6 +118,10 @@ asio::awaitable<Result<ExperimentView>> Experiments::begin(storage::ExperimentRe
   const ExperimentId id = experiment.id;
   Entry& kept = entries_[id];
   kept = std::move(entry);
+  if (stops_[robot_id] != stops_before) {  // SAFETY: a stop while it was being stored holds it as what waited already
+    kept.experiment.is_held = kept.is_changed = true;
+    kept.experiment.reason = "emergency_stop";
+  }
   const WaitReason waits = wait_reason_of(kept);
   kept.waits_for = waits.reason;
   kept.waits_for_detail = waits.detail;

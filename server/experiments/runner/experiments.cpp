@@ -338,6 +338,7 @@ void Experiments::on_robot(const station::RobotState& robot) {
 
 // SAFETY: after a stop nothing begins before somebody has looked, whether an experiment ran or not.
 void Experiments::hold_after_stop(const station::RobotId& robot_id) {
+  ++stops_[robot_id];
   for (Entry* entry : queue_of(robot_id)) {
     if (entry->experiment.is_held) continue;
     entry->experiment.is_held = entry->is_changed = true;

@@ -146,6 +146,7 @@ class Experiments final : public station::StationSink {
   OnChange on_change_ = [](const ExperimentView&) {};
   std::map<storage::ExperimentId, Entry> entries_;             // that have not ended
   std::map<station::RobotId, storage::ExperimentId> running_;  // of each robot at most one
+  std::map<station::RobotId, std::uint64_t> stops_;            // emergency stops asked for
   std::map<station::RobotId, std::int64_t> commanded_at_us_;   // steady, when a person last commanded a robot
   std::set<station::RobotId> resting_;                         // of to_rest_: somebody is at it
   bool is_storing_ = false;

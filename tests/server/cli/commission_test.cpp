@@ -1,11 +1,14 @@
-// What the commissioning of a robot finds, from facts that are good and facts that are not; its plan and its record.
+// What the commissioning of a robot finds while it lies still, from facts that are good and facts that are not; its
+// plan, its record, and the person.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <cmath>
+#include <csignal>
 #include <random>
 
-#include "server/cli/commission/motion.hpp"
+#include "server/cli/commission/person.hpp"
 #include "server/cli/commission/plan.hpp"
 #include "server/cli/commission/record.hpp"
 #include "server/cli/commission/standstill.hpp"
@@ -71,6 +74,11 @@ TEST(CommissionVersions, WantOneVersionAndACalibratedSensor) {
   EXPECT_THAT(judge_versions(facts).action, HasSubstr("flash"));
   facts = {"0.9.0", "0.9.0", "0.9.0", "watchdog", 3, true};
   EXPECT_EQ(judge_versions(facts).verdict, Verdict::attention);
+  facts = {"esp8266-10.9.0", "0.9.0", "0.9.0", "power_on", 3, true};
+  EXPECT_EQ(judge_versions(facts).verdict, Verdict::attention) << "10.9.0 is not 0.9.0";
+  facts = {"esp8266-0.9.0", "0.9.0", "0.9.0", "power_on", 3, false};
+  EXPECT_THAT(judge_versions(facts).found, HasSubstr("calibration is not known"));
+  EXPECT_EQ(judge_versions(facts).verdict, Verdict::attention);
 }
 
 TEST(CommissionAtRest, JudgesTheNoiseByWhatTheEstimatorAssumes) {
@@ -98,144 +106,6 @@ TEST(CommissionAtRest, JudgesTheElectrodeByTheBandOfTheMonitor) {
   EXPECT_EQ(electrode_with(175, 0).verdict, Verdict::attention) << "a reading that never changes";
 }
 
-// A robot that follows the duty with a lag of 80 ms and 0.1 m/s per duty, above a dead zone.
-std::vector<RecordedSample> driven(const json& profile, double gain, double dead_zone, double noise) {
-  constexpr double kTick = 0.01, kLag = 0.08;
-  std::mt19937 random{3};
-  std::normal_distribution<double> normal{0, noise};
-  std::vector<RecordedSample> samples;
-  double velocity = 0;
-  for (const json& step : profile.at("step")) {
-    const double duty = step.value("duty", 0.0), driven_duty = std::abs(duty) < dead_zone ? 0 : duty;
-    for (int i = 0; i < std::lround(step.at("for_s").get<double>() / kTick); ++i) {
-      const double acceleration = (gain * driven_duty - velocity) / kLag;
-      RecordedSample sample;
-      sample.robot_time_us = static_cast<std::int64_t>(samples.size()) * 10'000;
-      sample.duty = duty;
-      sample.acceleration_m_s2 = acceleration + normal(random);
-      velocity += acceleration * kTick;
-      samples.push_back(sample);
-    }
-  }
-  return samples;
-}
-
-const CommissionPlan kPlan;
-
-Response pushed(double gain) { return responses_of(driven(direction_profile(kPlan), gain, 0, 0.012), 0.012).back(); }
-
-TEST(CommissionMotion, SeesAPushInTheAccelerationAndNoneWhereThereIsNone) {
-  const Response seen = pushed(0.1);
-  EXPECT_EQ(seen.duty, 0.2);
-  EXPECT_EQ(seen.edges, 2);
-  EXPECT_NEAR(seen.velocity_m_s, 0.1 * 0.2 * (1 - std::exp(-0.25 / 0.08)), 4 * seen.sd_m_s);
-  EXPECT_TRUE(seen.is_seen());
-  EXPECT_LT(pushed(-0.1).velocity_m_s, 0);
-  EXPECT_FALSE(pushed(0).is_seen());
-  auto samples = driven(direction_profile(kPlan), 0.1, 0, 0.012);
-  samples.erase(samples.begin() + 60);  // in the window of the first edge
-  EXPECT_EQ(responses_of(samples, 0.012).back().edges, 1);
-}
-
-TEST(CommissionMotion, TellsAReversedMotorFromASensorThatIsTheWrongWayRound) {
-  struct Case {
-    double gain;  // as the accelerometer sees it
-    SeenByPerson person;
-    Verdict motor, axis;
-  };
-  const Case cases[] = {{0.1, SeenByPerson::forwards, Verdict::pass, Verdict::pass},
-                        {-0.1, SeenByPerson::forwards, Verdict::pass, Verdict::fail},
-                        {-0.1, SeenByPerson::backwards, Verdict::fail, Verdict::pass},
-                        {0.1, SeenByPerson::backwards, Verdict::fail, Verdict::fail},
-                        {0, SeenByPerson::forwards, Verdict::pass, Verdict::fail},
-                        {0, SeenByPerson::backwards, Verdict::fail, Verdict::fail},
-                        {0, SeenByPerson::nothing, Verdict::fail, Verdict::not_done}};
-  for (const Case& one : cases) {
-    const DirectionFacts facts{pushed(one.gain), one.person};
-    EXPECT_EQ(judge_motor_direction(facts).verdict, one.motor) << one.gain;
-    EXPECT_EQ(judge_imu_axis(facts).verdict, one.axis) << one.gain;
-  }
-  EXPECT_THAT(judge_imu_axis({pushed(0), SeenByPerson::forwards}).found, HasSubstr("lies across the tube"));
-  EXPECT_THAT(judge_imu_axis({pushed(-0.1), SeenByPerson::forwards}).found, HasSubstr("wrong way round"));
-}
-
-StepFinding dead_zone_of(double dead_zone, double parameter) {
-  DeadZoneFacts facts;
-  facts.responses = responses_of(driven(pushes_profile(kPlan), 0.1, dead_zone, 0.012), 0.012);
-  facts.parameter = parameter;
-  return judge_dead_zone(facts);
-}
-
-TEST(CommissionMotion, FindsTheDeadZoneBetweenTwoDuties) {
-  EXPECT_EQ(dead_zone_of(0, 0).verdict, Verdict::pass);
-  const StepFinding unknown = dead_zone_of(0.08, 0);
-  EXPECT_EQ(unknown.verdict, Verdict::attention);
-  EXPECT_EQ(unknown.figures.at("forwards").at("still_at"), 0.06);
-  EXPECT_EQ(unknown.figures.at("backwards").at("moves_at"), 0.1);
-  EXPECT_EQ(dead_zone_of(0.08, 0.08).verdict, Verdict::pass) << "one that the robot knows";
-  EXPECT_EQ(dead_zone_of(0.9, 0).verdict, Verdict::fail) << "a motor that does not turn";
-}
-
-TEST(CommissionMotion, WantsAMotorWithoutReverseToRefuseBackwards) {
-  CommissionPlan plan;
-  plan.is_one_way = true;
-  DeadZoneFacts facts;
-  facts.responses = responses_of(driven(pushes_profile(plan), 0.1, 0, 0.012), 0.012);
-  facts.is_one_way = facts.has_refused_backwards = true;
-  EXPECT_EQ(judge_dead_zone(facts).verdict, Verdict::pass);
-  EXPECT_THAT(judge_dead_zone(facts).found, HasSubstr("without reverse"));
-  facts.has_refused_backwards = false;
-  EXPECT_EQ(judge_dead_zone(facts).verdict, Verdict::fail);
-}
-
-json fit_of(double gain, double sigma, double b1, double b2) {
-  return {{"parameters", {{"kp", gain}, {"b1", b1}, {"b2", b2}, {"b3", 1}}},
-          {"one_sigma", {{"kp", sigma}, {"b1", 8e-5}, {"b2", 2e-3}}},
-          {"correlation_of", {"kp", "b1", "b2"}},
-          {"correlation", {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}},
-          {"residuals_are_white", true},
-          {"end", "converged"},
-          {"fit_percent", 80}};
-}
-
-TEST(CommissionMotion, GivesTheLagsOfTheNewtonianModel) {
-  const StepFinding found = judge_motor_constant({fit_of(232 / 667.1, 0.001, 1 / 667.1, 60.13 / 667.1), ""});  // (28)
-  EXPECT_EQ(found.verdict, Verdict::pass);
-  EXPECT_NEAR(found.figures.at("lags_s").at(0).get<double>(), 0.0220, 2e-4);  // (27)
-  EXPECT_NEAR(found.figures.at("lags_s").at(1).get<double>(), 0.0682, 2e-4);
-  // dτ/db1 = 1/√(b2² - 4 b1) and dτ/db2 = (1 - b2/√(…))/2 of the shorter one.
-  const double root = std::sqrt(std::pow(60.13 / 667.1, 2) - 4 / 667.1);
-  const double sigma = std::hypot(8e-5 / root, 2e-3 * (1 - 60.13 / 667.1 / root) / 2);
-  EXPECT_NEAR(found.figures.at("lag_sigmas_s").at(0).get<double>(), sigma, 0.02 * sigma);
-}
-
-TEST(CommissionMotion, DoubtsAFitThatSaysLittle) {
-  EXPECT_EQ(judge_motor_constant({fit_of(0.1, 0.05, 0.0017, 0.09), ""}).verdict, Verdict::attention);
-  EXPECT_EQ(judge_motor_constant({fit_of(-0.1, 0.001, 0.0017, 0.09), ""}).verdict, Verdict::fail);
-  EXPECT_THAT(judge_motor_constant({fit_of(0.1, 0.001, 0.01, 0.09), ""}).found, HasSubstr("not told apart"));
-  const StepFinding failed = judge_motor_constant({nullptr, "a gap"});
-  EXPECT_EQ(failed.verdict, Verdict::fail);
-  EXPECT_THAT(failed.found, HasSubstr("a gap"));
-}
-
-TEST(CommissionMotion, HoldsTheRobotsLimitsAgainstTheRulers) {
-  TravelFacts facts{.ahead_m = 0.5, .behind_m = 0.4, .limit_min_m = -0.3, .limit_max_m = 0.4};
-  facts.believed_m = 0.02;
-  facts.believed_sd_m = 0.001;
-  EXPECT_EQ(judge_free_travel(facts).verdict, Verdict::pass);
-  facts.measured_m = 0.023;
-  EXPECT_EQ(judge_free_travel(facts).verdict, Verdict::pass) << "within 2 sd and the ruler's own error";
-  facts.measured_m = 0.03;
-  EXPECT_THAT(judge_free_travel(facts).action, HasSubstr("believes a wrong way"));
-  facts.measured_m.reset();
-  facts.limit_max_m = 100;
-  EXPECT_THAT(judge_free_travel(facts).action, HasSubstr("position_limit_max_m=0.40 and position_limit_min_m=-0.32"));
-  facts.limit_max_m = 0.4;
-  facts.gain_m_s = 0.35;
-  facts.worst_stop_ms = 500;
-  EXPECT_EQ(judge_free_travel(facts).verdict, Verdict::attention) << "17 cm until a stop arrives";
-}
-
 TEST(CommissionPlan, BeginsSmallAndStaysWithinItsDuty) {
   for (const bool is_one_way : {false, true}) {
     const CommissionPlan plan{0.3, is_one_way};
@@ -254,7 +124,8 @@ TEST(CommissionPlan, BeginsSmallAndStaysWithinItsDuty) {
       EXPECT_LE(duration_of(profile), 20);
     }
   }
-  EXPECT_NEAR(needed_m({0.3, false}), 0.4 * (0.3 * 0.3 + 0.2 + 0.3), 1e-9);
+  EXPECT_NEAR(needed_m({0.3, false}), 0.4 * (4 * 0.3 * (0.03 + 0.06 + 0.1 + 0.2 + 0.3) + 0.2 + 0.3), 1e-9)
+      << "the pushes count one way: a reverse that was never seen may drive forwards";
   EXPECT_NEAR(needed_m({0.3, true}), 0.4 * (2 * 0.3 * (0.03 + 0.06 + 0.1 + 0.2 + 0.3) + 0.2 + 4 * 0.3), 1e-9);
 }
 
@@ -304,6 +175,66 @@ TEST_F(CommissionRecordTest, SaysWhyItIsNotSigned) {
   EXPECT_EQ(document_of(record_).at("outcome"), "not_passed");
   EXPECT_THAT(page_of(record_), HasSubstr("**Not signed**: it ended before its end"));
   EXPECT_THAT(page_of(record_), HasSubstr("10 of 10 \\| confirmed"));
+}
+
+TEST_F(CommissionRecordTest, OfARealRobotThatNobodyWatchedIsNotSigned) {
+  record_.subject["firmware_version"] = "sim-0.9.0";
+  record_.is_confirmed_beforehand = true;
+  record_.prepared = {"direction", "free_ahead_m"};
+  EXPECT_EQ(unsigned_reason(record_), "");
+  EXPECT_EQ(document_of(record_).at("confirmed_by"), "nobody: --yes was given beforehand");
+  EXPECT_EQ(document_of(record_).at("answers_given_beforehand"), (json{"direction", "free_ahead_m"}));
+  EXPECT_THAT(page_of(record_), HasSubstr("confirmed by nobody: --yes was given beforehand. Answers given beforehand: "
+                                          "direction, free_ahead_m."));
+  record_.subject["firmware_version"] = "esp8266-0.9.0";
+  EXPECT_THAT(unsigned_reason(record_), HasSubstr("nobody watched it"));
+  record_.is_confirmed_beforehand = false;
+  EXPECT_THAT(unsigned_reason(record_), HasSubstr("nobody watched it")) << "a direction that was known before";
+  record_.prepared = {"free_ahead_m"};
+  EXPECT_EQ(unsigned_reason(record_), "");
+}
+
+TEST_F(CommissionRecordTest, WithARunWithoutADigestIsNotSigned) {
+  record_.runs.push_back({{"run_id", 7}, {"sha256", "ab"}});
+  EXPECT_EQ(unsigned_reason(record_), "");
+  record_.runs.push_back({{"run_id", 8}, {"sha256", nullptr}});
+  EXPECT_EQ(unsigned_reason(record_), "run 8 has no digest");
+}
+
+TEST_F(CommissionRecordTest, SaysAsJsonThatTheStationHasNotNotedIt) {
+  EXPECT_EQ(printed_of(record_, {"f", "ab"}, "refused").at("not_marked"), "refused");
+  EXPECT_TRUE(printed_of(record_, {"f", "ab"}, "").at("not_marked").is_null());
+}
+
+TEST(CommissionPerson, NoticesSignalsInEveryLookAndWait) {
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
+    Interruption interruption;
+    EXPECT_NO_THROW(interruption.throw_if_come());
+    std::raise(signal);
+    EXPECT_THROW(interruption.throw_if_come(), Interrupted);
+    EXPECT_THROW(interruption.throw_if_come(), Interrupted) << "and again";
+  }
+  Interruption interruption;
+  Person person{json::object(), true, interruption};
+  EXPECT_NO_THROW(person.confirm("Is the way free?"));
+  std::raise(SIGINT);
+  EXPECT_THROW(interruption.wait(std::chrono::milliseconds{1}), Interrupted);
+  EXPECT_THROW(person.confirm("Is the way free?"), Interrupted);
+  EXPECT_THROW(person.word("direction", "Which way?", kDirections), Interrupted);
+}
+
+TEST(CommissionPerson, IsToldThingsAlsoWhenTheTerminalIsGone) {
+  Interruption interruption;
+  Person person{json::object(), true, interruption};
+  const int kept = ::dup(STDERR_FILENO);
+  int ends[2];
+  ASSERT_EQ(::pipe(ends), 0);
+  ::close(ends[0]);
+  ::dup2(ends[1], STDERR_FILENO);
+  EXPECT_NO_THROW(person.tell("the robot is stopped"));
+  ::dup2(kept, STDERR_FILENO);
+  ::close(kept);
+  ::close(ends[1]);
 }
 
 TEST_F(CommissionRecordTest, RefusesAnswersThatAreNoneBeforeItBegins) {

@@ -1,0 +1,25 @@
+// Whether the robot's own limits keep it within the length that the person measured. Facts in, a finding out.
+//
+// The limits count from the robot's zero, and each of its runs begins with a new one, where the run before has ended:
+// how far that lies from where the ruler was laid is believed, with its sd.
+// Errors: none.
+#pragma once
+
+#include <optional>
+
+#include "server/cli/commission/finding.hpp"
+
+namespace server::cli {
+
+struct TravelFacts {
+  double ahead_m = 0, behind_m = 0;              // free, by the person's ruler, from where the robot lay
+  double limit_min_m = -100, limit_max_m = 100;  // the robot's parameters
+  double believed_m = 0, believed_sd_m = 0;      // after the push that the person watched
+  double zero_m = 0, zero_sd_m = 0;              // where its zero lies now, from where the ruler was laid: believed
+  std::optional<double> measured_m{};            // the same by the ruler
+  std::optional<double> gain_m_s{};              // per duty
+  double duty_max = 1, worst_stop_ms = 0;
+};
+StepFinding judge_free_travel(const TravelFacts& facts);
+
+}  // namespace server::cli
