@@ -1,7 +1,7 @@
 // One Foxglove client on /foxglove: sends what it has subscribed to, and receives subscriptions alone.
 //
 // One reader and one writer. What waits for it is bounded (OutgoingQueue: the oldest samples are dropped, and it gets a
-// status). A message of a client has at most 64 kB, or the connection ends with the WebSocket's code 1009. It ends as
+// status). A message of a client has at most 4 kB, or the connection ends with the WebSocket's code 1009. It ends as
 // well when the client falls silent or does not read (PeerWatch), and with the session or token of who made its ticket.
 // Loop thread; the parts outlive the connection.
 #pragma once

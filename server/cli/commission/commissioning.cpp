@@ -36,20 +36,30 @@ std::string lost_text(const StopAnswer& stop) {
 // Control of the robot, given back whatever happens.
 class Control {
  public:
-  explicit Control(const RobotAccess& robot) : robot_{robot} {
+  Control(RobotAccess& robot, Person& person) : robot_{robot}, person_{person} {
     try {
       robot.take_control();
     } catch (...) {  // Ctrl-C, or an answer that is lost: it may have been given
       robot.release_control();
       throw;
     }
+    person.while_asked([&robot] { robot.keep_control(); });
   }
-  ~Control() { robot_.release_control(); }
+  ~Control() {
+    person_.while_asked({});
+    robot_.release_control();
+  }
   Control(const Control&) = delete;
   Control& operator=(const Control&) = delete;
 
  private:
-  const RobotAccess& robot_;
+  RobotAccess& robot_;
+  Person& person_;
+};
+
+// Somebody else drives the robot: it must not be stopped for our sake.
+struct NotOurs : std::runtime_error {
+  using runtime_error::runtime_error;
 };
 
 }  // namespace
@@ -132,6 +142,15 @@ void Commissioning::stop_and_reset() {
 void Commissioning::prove_stops() {
   person_.confirm(fmt::format("Begin with {} emergency stops? The motor stays off.", kStops));
   try {
+    robot_.take_control();
+    const json state = robot_.state();
+    if (state.at("mode") != "manual" || state.at("sample").is_null() || state.at("sample").at("duty") != 0.0) {
+      throw std::runtime_error{"it no longer rests in manual"};
+    }
+  } catch (const std::exception& error) {
+    throw NotOurs{fmt::format("somebody else has the robot: {}", error.what())};
+  }
+  try {
     for (int i = 0; i < kStops; ++i) stop_and_reset();
   } catch (const std::exception& error) {
     stops_.not_confirmed = error.what();
@@ -178,7 +197,7 @@ void Commissioning::push() {
   dead_zone_.parameter = value_of(parameters_, "dead_zone_duty", 0);
   dead_zone_.tried = duties_in(profile);
   dead_zone_.responses = responses_of(record_run(profile).samples, sd_of(rest_.acceleration_m_s2));
-  if (plan_.is_one_way) dead_zone_.has_refused_backwards = robot_.refuses_duty(-smallest_duty(plan_));
+  if (plan_.is_one_way) dead_zone_.backwards = robot_.try_duty(-smallest_duty(plan_));
 }
 
 void Commissioning::find_direction() {
@@ -260,9 +279,11 @@ void Commissioning::perform() {
 void Commissioning::run() {
   look_at_robot();
   ask_for_room();
-  const Control control{robot_};
+  const Control control{robot_, person_};
   try {
     perform();
+  } catch (const NotOurs&) {
+    throw;
   } catch (const Interrupted&) {
     end_early("interrupted by a signal");
   } catch (const Declined&) {

@@ -256,17 +256,19 @@ StepFinding judge_dead_zone(const DeadZoneFacts& facts) {
                      {"one_way", facts.is_one_way},
                      {"dead_zone_duty", facts.parameter},
                      {"responses", responses}};
-  if (facts.responses.size() < facts.tried) {
+  // With as many edges of both kinds an error of the bias cancels.
+  const auto is_whole = [](const Response& one) { return one.edges() > 0 && one.rising == one.falling; };
+  const auto whole = static_cast<std::size_t>(std::ranges::count_if(facts.responses, is_whole));
+  if (whole < facts.tried) {
     finding.verdict = Verdict::not_done;
-    finding.found =
-        fmt::format("samples are missing: {} of {} duties can be judged", facts.responses.size(), facts.tried);
+    finding.found = fmt::format("samples are missing: {} of {} duties can be judged", whole, facts.tried);
     finding.action = "see to the link, and push again";
     return finding;
   }
-  if (facts.is_one_way && !facts.has_refused_backwards) {
+  if (facts.is_one_way && facts.backwards == DutyAnswer::none) {
     finding.verdict = Verdict::not_done;
-    finding.found += ", but the robot itself was not asked for a duty below 0: the station let none through";
-    finding.action = "see whether the station's own limits (duty_min) or another command stood in the way";
+    finding.found += ", but nothing says what the robot does with a duty below 0";
+    finding.action = "see whether another command stood in the way, and begin again";
     return finding;
   }
   const double still = std::max(forwards.still.value_or(0), facts.is_one_way ? 0 : backwards.still.value_or(0));
@@ -277,10 +279,16 @@ StepFinding judge_dead_zone(const DeadZoneFacts& facts) {
     finding.verdict = Verdict::fail;
     finding.found += ", but the reverse does not reverse: a duty below 0 drives it as one above 0 does";
     finding.action = "see to the wire of `direction_pin` and to the driver (docs/hardware.md, Wiring)";
-  } else if (facts.is_one_way && !*facts.has_refused_backwards) {
+  } else if (facts.is_one_way && facts.backwards == DutyAnswer::taken) {
     finding.verdict = Verdict::fail;
-    finding.found += ", but the robot did not refuse a duty below 0";
-    finding.action = "see to `direction_pin` and the duty range in robot_fw/esp8266/settings.hpp";
+    finding.found += ", but the robot took a duty below 0";
+    finding.action =
+        "if the motor reverses, send a controller that may use it (duty_min), and begin again; if not, see to "
+        "`direction_pin` and the duty range in robot_fw/esp8266/settings.hpp";
+  } else if (facts.is_one_way && facts.backwards == DutyAnswer::refused_by_station) {
+    finding.verdict = Verdict::attention;
+    finding.found += "; the station's limits let no duty below 0 through, so the robot itself was not asked";
+    finding.action = "commission it again before that limit (duty_min) is widened";
   } else if (const double moving = std::max(*forwards.moving, facts.is_one_way ? 0 : *backwards.moving);
              facts.parameter < still || facts.parameter > moving) {
     finding.verdict = Verdict::attention;

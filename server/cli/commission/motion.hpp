@@ -54,12 +54,15 @@ struct DirectionFacts {
 StepFinding judge_motor_direction(const DirectionFacts& facts);
 StepFinding judge_imu_axis(const DirectionFacts& facts);
 
+// What became of a duty out of the motor's range. The station's own limits may let none through to the robot.
+enum class DutyAnswer : std::uint8_t { none, refused_by_robot, refused_by_station, taken };
+
 struct DeadZoneFacts {
   std::vector<Response> responses;
-  std::size_t tried = 0;                        // duties
-  bool is_one_way = false;                      // the motor runs forwards alone
-  std::optional<bool> has_refused_backwards{};  // and the robot refused a duty below 0; none: it was not asked
-  double parameter = 0;                         // dead_zone_duty of the robot
+  std::size_t tried = 0;                    // duties
+  bool is_one_way = false;                  // the controller in force runs the motor forwards alone
+  DutyAnswer backwards = DutyAnswer::none;  // and what became of a duty below 0
+  double parameter = 0;                     // dead_zone_duty of the robot
 };
 StepFinding judge_dead_zone(const DeadZoneFacts& facts);
 

@@ -113,6 +113,7 @@ std::string Person::asked(const std::string& question) {
   std::string line;
   for (;;) {
     interruption_.throw_if_come();
+    if (while_asked_) while_asked_();
     pollfd input{STDIN_FILENO, POLLIN, 0};
     if (::poll(&input, 1, kLookAtSignalsMs) <= 0) continue;
     char one = 0;
@@ -124,11 +125,15 @@ std::string Person::asked(const std::string& question) {
   }
 }
 
+void Person::forget_typed() const {
+  if (has_terminal_) ::tcflush(STDIN_FILENO, TCIFLUSH);
+}
+
 void Person::confirm(const std::string& what) {
   interruption_.throw_if_come();
   if (says_yes_) return tell(what + " [yes, by --yes]");
   for (;;) {
-    if (has_terminal_) ::tcflush(STDIN_FILENO, TCIFLUSH);
+    forget_typed();
     const std::string answer = asked(what + " [yes/no]");
     if (answer == "yes" || answer == "y") return;
     if (answer == "no" || answer == "n") throw Declined{};
@@ -163,6 +168,7 @@ double Person::length_m(const std::string& name, const std::string& question) {
 std::string Person::word(const std::string& name, const std::string& question,
                          const std::vector<std::string>& allowed) {
   for (;;) {
+    forget_typed();
     const std::string word = answers_.contains(name) ? answers_.at(name).get<std::string>()
                                                      : asked(fmt::format("{} [{}]", question, fmt::join(allowed, "/")));
     if (std::ranges::find(allowed, word) == allowed.end()) continue;

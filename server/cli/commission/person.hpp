@@ -7,6 +7,7 @@
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/signal_set.hpp>
 #include <chrono>
+#include <functional>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
@@ -50,17 +51,22 @@ class Person {
   std::string word(const std::string& name, const std::string& question, const std::vector<std::string>& allowed);
   std::string text(const std::string& name, const std::string& question);  // "": no answer
 
+  // Called every 0.1 s while an answer is awaited on the terminal.
+  void while_asked(std::function<void()> work) { while_asked_ = std::move(work); }
+
   const nlohmann::ordered_json& given() const { return given_; }  // what was answered, by name
   bool says_yes() const { return says_yes_; }
   std::vector<std::string> prepared() const;  // names of the answers that were given beforehand
 
  private:
   std::string asked(const std::string& question);
+  void forget_typed() const;  // what was typed before a question does not answer it
 
   nlohmann::json answers_;
   bool says_yes_;
   bool has_terminal_;
   Interruption& interruption_;
+  std::function<void()> while_asked_;
   nlohmann::ordered_json given_ = nlohmann::ordered_json::object();
 };
 

@@ -167,9 +167,16 @@ WrittenRecord write(const CommissionRecord& record, const std::filesystem::path&
   const std::string json = document_of(record).dump(2, ' ', false, Json::error_handler_t::replace) + "\n",
                     page = page_of(record);
   const std::string sha256 = runtime::sha256_of(json);
-  write_file(folder / "record.json", json);
-  write_file(folder / "record.md", page);
-  write_file(folder / "SHA256SUMS", fmt::format("{}  record.json\n{}  record.md\n", sha256, runtime::sha256_of(page)));
+  try {
+    write_file(folder / "record.json", json);
+    write_file(folder / "record.md", page);
+    write_file(folder / "SHA256SUMS",
+               fmt::format("{}  record.json\n{}  record.md\n", sha256, runtime::sha256_of(page)));
+  } catch (...) {  // half a record could be taken for a signed one
+    std::error_code ignored;
+    std::filesystem::remove_all(folder, ignored);
+    throw;
+  }
   return {folder, sha256};
 }
 

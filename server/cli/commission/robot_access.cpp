@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <boost/asio/io_context.hpp>
+#include <set>
 #include <stdexcept>
 
 #include "server/cli/commission/plan.hpp"
@@ -19,16 +20,23 @@ constexpr microseconds kPatience{8'000'000};      // of a request; a verified co
 constexpr microseconds kStopPatience{7'000'000};  // SAFETY: as of `rheonaut stop`
 constexpr std::chrono::milliseconds kLook{20};
 constexpr std::int64_t kReleasePatienceUs = 2'000'000;
-constexpr std::int64_t kLatchedWithinUs = 5'000'000, kBeginsWithinUs = 20'000'000, kEndsLateUs = 30'000'000;
+constexpr std::int64_t kLatchedWithinUs = 5'000'000, kBeginsWithinUs = 50'000'000, kEndsLateUs = 30'000'000;
 constexpr std::int64_t kDigestWithinUs = 10'000'000, kFitWithinUs = 120'000'000;
-constexpr int kFitTimeLimitS = 60, kControlMs = 600'000, kPage = 1000;
+constexpr std::int64_t kFitWaitsUs = 600'000'000;  // behind the computations of others
+constexpr int kFitTimeLimitS = 60, kControlMs = 15'000, kPage = 1000;
+constexpr std::int64_t kControlAgainUs = 5'000'000;
+constexpr std::int64_t kAliveUs = 400'000;          // SAFETY: after so long a silence the station pauses a run
+constexpr microseconds kBeginPatience{30'000'000};  // of an experiment's request, which computes; nothing moves yet
 constexpr double kUsOfS = 1e6;
+
+constexpr const char* kExperiments = "/api/v1/experiments";
 
 // The end of a wait.
 class Deadline {
  public:
   explicit Deadline(std::int64_t within_us) : ends_us_{clock_.steady_us() + within_us} {}
   bool is_over() const { return clock_.steady_us() > ends_us_; }
+  void begin_again(std::int64_t within_us) { ends_us_ = clock_.steady_us() + within_us; }
 
  private:
   boost::asio::io_context loop_;
@@ -48,12 +56,25 @@ RecordedSample sample_in(const json& row) {
           row.at("flags").get<long>()};
 }
 
+std::int64_t steady_us() {
+  boost::asio::io_context loop;
+  return runtime::SystemClock{loop}.steady_us();
+}
+
 std::string text_or(const json& object, const char* name, const char* other) {
-  const json value = object.value(name, json());
+  const json value = object.is_object() ? object.value(name, json()) : json();
   return value.is_string() ? value.get<std::string>() : other;
 }
 
 }  // namespace
+
+bool has_repeated_step(const json& run) {
+  std::set<long> begun;
+  for (const json& one : run.at("steps")) {
+    if (!begun.insert(one.at("step").get<long>()).second) return true;
+  }
+  return false;
+}
 
 RobotAccess::RobotAccess(const std::filesystem::path& data_dir, std::string robot_id, Interruption& interruption)
     : client_{data_dir},
@@ -66,7 +87,8 @@ RobotAccess::RobotAccess(const std::filesystem::path& data_dir, std::string robo
 
 StationAnswer RobotAccess::ask(const std::string& method, const std::string& target, const json& body) const {
   interruption_.throw_if_come();
-  StationAnswer answer = client_.ask_at_once({{method, target, body}}, kPatience).front();
+  const microseconds patience = target == kExperiments ? kBeginPatience : kPatience;
+  StationAnswer answer = client_.ask_at_once({{method, target, body}}, patience).front();
   interruption_.throw_if_come();
   if (answer.status == 0) throw std::runtime_error{answer.text};
   return answer;
@@ -80,17 +102,33 @@ json RobotAccess::parameters() const {
   return by_name;
 }
 
-void RobotAccess::take_control() const { post(path_ + "/control", {{"action", "take"}, {"lease_ms", kControlMs}}); }
+void RobotAccess::take_control() {
+  post(path_ + "/control", {{"action", "take"}, {"lease_ms", kControlMs}});
+  controlled_us_ = steady_us();
+}
+
+void RobotAccess::keep_control() {
+  if (steady_us() - controlled_us_ > kControlAgainUs) take_control();
+}
 
 void RobotAccess::release_control() const noexcept {
-  client_.ask_at_once({{"POST", path_ + "/control", {{"action", "release"}}}}, microseconds{kReleasePatienceUs});
+  try {
+    client_.ask_at_once({{"POST", path_ + "/control", {{"action", "release"}}}}, microseconds{kReleasePatienceUs});
+  } catch (const std::exception&) {  // no memory or descriptor for the request; the lease ends by itself
+  }
 }
 
 StopAnswer RobotAccess::stop() const {
-  const StationAnswer answer = client_.ask_at_once({{"POST", path_ + "/emergency-stop"}}, kStopPatience).front();
+  StopAnswer outcome;
+  StationAnswer answer;
+  try {
+    answer = client_.ask_at_once({{"POST", path_ + "/emergency-stop"}}, kStopPatience).front();
+  } catch (const std::exception& error) {
+    outcome.why = error.what();
+    return outcome;
+  }
   const json record = answer.body.is_object() ? answer.body : json::object();
   const std::string state = text_or(record, "state", "");
-  StopAnswer outcome;
   // SAFETY: only what the robot itself has acknowledged counts as a stop; sent or queued is not enough.
   outcome.is_confirmed = state == "acknowledged" || state == "verified";
   outcome.confirmed_ms = number_or_0(record.value("acknowledged_after_us", json())) / 1e3;
@@ -141,8 +179,14 @@ void RobotAccess::abort_own_experiments() const {
 }
 
 RecordedRun RobotAccess::perform(const json& profile) {
-  take_control();  // for as long as somebody may think between two steps
-  const auto ask_station = [this](const std::string& method, const std::string& target, const json& body) {
+  take_control();
+  Deadline alive{kBeginsWithinUs};  // until the first sign of life
+  const auto ask_station = [this, &alive](const std::string& method, const std::string& target, const json& body) {
+    if (target.ends_with("/keep-alive")) {
+      // SAFETY: the station pauses a run without signs of life; the next one would let it go on, with nobody asked.
+      if (alive.is_over()) throw std::runtime_error{"this computer stood still while the robot moved"};
+      alive.begin_again(kAliveUs);
+    }
     return ask(method, target, body);
   };
   const Deadline begins{kBeginsWithinUs};
@@ -161,14 +205,15 @@ RecordedRun RobotAccess::perform(const json& profile) {
                            if (ends.is_over()) throw std::runtime_error{"the experiment does not end"};
                          }};
   has_experiment_ = true;  // also when its answer is lost
-  const json begun =
-      work.post("/api/v1/experiments", {{"robot_id", robot_id_}, {"profile", profile}, {"notes", notes_}});
+  const json begun = work.post(kExperiments, {{"robot_id", robot_id_}, {"profile", profile}, {"notes", notes_}});
   const json ended = work.finished_experiment(begun.at("experiment_id").get<std::int64_t>());
   has_experiment_ = false;
   if (ended.at("state") != "done") {
     throw std::runtime_error{fmt::format("the experiment was {}: {} {}", text_or(ended, "state", "?"),
                                          text_or(ended, "reason", ""), text_or(ended, "detail", ""))};
   }
+  // SAFETY: a step that was repeated needs a way that nobody was asked about.
+  if (has_repeated_step(ended.at("runs").front())) throw std::runtime_error{"the station had to repeat a step"};
   RecordedRun run;
   run.run_id = ended.at("runs").front().at("run_id").get<std::int64_t>();
   run.samples = samples_of(run.run_id);
@@ -202,18 +247,21 @@ nlohmann::ordered_json RobotAccess::reference_of(std::int64_t run_id, const std:
           {"sha256", digest.value("sha256", json())}};
 }
 
-std::optional<bool> refused_by_robot(const StationAnswer& answer) {
+DutyAnswer duty_answer(const StationAnswer& answer) {
   const json body = answer.body.is_object() ? answer.body : json::object();
   const json record = body.value("command", body);
-  const std::string state = record.is_object() ? text_or(record, "state", "") : "";
-  if (state == "acknowledged" || state == "verified") return false;
-  if (state == "rejected" && text_or(record, "reason", "") == "out_of_range") return true;
-  return std::nullopt;
+  const std::string state = text_or(record, "state", "");
+  const bool is_out_of_range = text_or(record, "reason", "") == "out_of_range";
+  constexpr int kInvalid = 422;
+  if (state == "acknowledged" || state == "verified") return DutyAnswer::taken;
+  if (state == "rejected" && is_out_of_range) return DutyAnswer::refused_by_robot;
+  if (state.empty() && answer.status == kInvalid && is_out_of_range) return DutyAnswer::refused_by_station;
+  return DutyAnswer::none;
 }
 
-std::optional<bool> RobotAccess::refuses_duty(double duty) const {
+DutyAnswer RobotAccess::try_duty(double duty) const {
   const json body{{"kind", "set_duty"}, {"duty", duty}, {"lease_ms", 1}};
-  return refused_by_robot(ask("POST", path_ + "/commands", body));
+  return duty_answer(ask("POST", path_ + "/commands", body));
 }
 
 json RobotAccess::fit(std::int64_t run_id, std::string& failure) const {
@@ -223,21 +271,33 @@ json RobotAccess::fit(std::int64_t run_id, std::string& failure) const {
                   {"cut_at_gaps", true},
                   {"time_limit_s", kFitTimeLimitS}};
   const auto id = post("/api/v1/jobs", body).at("job_id").get<std::int64_t>();
-  const Deadline deadline{kFitWithinUs};
+  const Deadline waits{kFitWaitsUs};
+  Deadline computes{kFitWithinUs};
   for (;;) {
     const json job = get(fmt::format("/api/v1/jobs/{}?wait_ms=500", id));
     if (job.at("state") == "done") return job.at("result");
-    if (!job.at("ended_at_us").is_null()) failure = text_or(job, "error", "the computation did not end well");
-    if (job.at("ended_at_us").is_null() && deadline.is_over()) failure = "the computation took longer than 2 minutes";
-    if (!failure.empty()) return nullptr;
+    if (!job.at("ended_at_us").is_null()) {
+      failure = text_or(job, "error", "the computation did not end well");
+      return nullptr;
+    }
+    if (job.at("state") == "waiting" && !waits.is_over()) computes.begin_again(kFitWithinUs);
+    if (!computes.is_over()) continue;
+    failure = "the computation took longer than 2 minutes";
+    post(fmt::format("/api/v1/jobs/{}/cancel", id), json::object());
+    return nullptr;
   }
 }
 
 std::string RobotAccess::mark(const std::string& line) const {
-  const StationAnswer answer = client_.ask_at_once({{"POST", path_ + "/markers", {{"text", line}}}}, kPatience).front();
   constexpr int kFirstProblem = 300;
-  if (answer.status != 0 && answer.status < kFirstProblem) return {};
-  return answer.status == 0 ? answer.text : text_or(answer.body, "detail", "refused");
+  try {
+    const StationAnswer answer =
+        client_.ask_at_once({{"POST", path_ + "/markers", {{"text", line}}}}, kPatience).front();
+    if (answer.status != 0 && answer.status < kFirstProblem) return {};
+    return answer.status == 0 ? answer.text : text_or(answer.body, "detail", "refused");
+  } catch (const std::exception& error) {  // a name that is no UTF-8; the record is signed already
+    return error.what();
+  }
 }
 
 }  // namespace server::cli

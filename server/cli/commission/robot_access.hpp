@@ -42,7 +42,8 @@ class RobotAccess {
   // By name. Throws when the robot has not reported them.
   nlohmann::json parameters() const;
 
-  void take_control() const;
+  void take_control();  // for 15 s, and each command and each sign of life prolongs it
+  void keep_control();  // again when 5 s have passed
   void release_control() const noexcept;
 
   // SAFETY: takes at most 7 s, whatever the station does; never throws.
@@ -53,10 +54,10 @@ class RobotAccess {
   // Waits until the robot is seen in emergency at duty 0, then resets this stop and waits for that too.
   void reset(const std::string& emergency_id) const;
 
-  // Gives signs of life while it lasts: when they end, the robot stops. Throws when it does not begin within 20 s, or
-  // does not end as planned.
+  // Gives signs of life while it lasts: when they end, and no other tool with the same token gives any, the robot
+  // stops. Throws when it does not begin within 50 s, does not end as planned, or a step was repeated.
   RecordedRun perform(const nlohmann::json& profile);
-  std::optional<bool> refuses_duty(double duty) const;  // a command for 1 ms; none: it did not reach the robot
+  DutyAnswer try_duty(double duty) const;                               // a command for 1 ms
   nlohmann::json fit(std::int64_t run_id, std::string& failure) const;  // null, with the reason
   // A line of the station's own record; the reason when it is not stored, else empty.
   std::string mark(const std::string& line) const;
@@ -75,12 +76,14 @@ class RobotAccess {
   std::string path_;
   std::string robot_id_;
   Interruption& interruption_;
-  std::string notes_;            // of its experiments, by which it knows them again
-  bool has_experiment_ = false;  // one may be open
+  std::string notes_;               // of its experiments, by which it knows them again
+  bool has_experiment_ = false;     // one may be open
+  std::int64_t controlled_us_ = 0;  // steady, when control was last taken
 };
 
-// What the answer to a command of a duty says: true, the robot itself refused it as out of its range; false, it took
-// it; none: anything else.
-std::optional<bool> refused_by_robot(const StationAnswer& answer);
+DutyAnswer duty_answer(const StationAnswer& answer);
+
+// Of a run in an experiment's document.
+bool has_repeated_step(const nlohmann::json& run);
 
 }  // namespace server::cli

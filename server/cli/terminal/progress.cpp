@@ -17,6 +17,13 @@ namespace {
 constexpr std::chrono::milliseconds kFirstLine{1000}, kPause{250};
 constexpr std::size_t kColumns = 78;  // a longer line would not be rewritten, but scroll
 
+// To a terminal that may have hung up: nothing is to fail for that.
+void show(const std::string& text) {
+  const std::string line = "\r\x1b[K" + text;
+  static_cast<void>(std::fwrite(line.data(), 1, line.size(), stderr));
+  static_cast<void>(std::fflush(stderr));
+}
+
 }  // namespace
 
 struct Progress::Line {
@@ -46,13 +53,13 @@ struct Progress::Line {
       const auto seconds =
           std::chrono::duration_cast<std::chrono::seconds>(std::chrono::steady_clock::now() - begun).count();
       const std::string text = one_line(fmt::format("{}: {}{} s", what, detail.empty() ? "" : detail + ", ", seconds));
-      fmt::print(stderr, "\r\x1b[K{}", text.substr(0, kColumns));
-      std::fflush(stderr);
+      lock.unlock();  // a terminal that is held (Ctrl-S) must not hold the work
+      show(text.substr(0, kColumns));
+      lock.lock();
       is_shown = true;
     }
-    if (!is_shown) return;
-    fmt::print(stderr, "\r\x1b[K");
-    std::fflush(stderr);
+    lock.unlock();
+    if (is_shown) show("");
   }
 
   const std::string what;

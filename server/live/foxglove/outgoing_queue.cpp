@@ -12,7 +12,8 @@ constexpr std::int64_t kReportIntervalUs = 1'000'000;
 }  // namespace
 
 void OutgoingQueue::push_lasting(std::string text) {
-  if (is_overrun()) return;
+  if (lasting_ == kMaxLasting) is_overrun_ = true;
+  if (is_overrun_) return;
   ++lasting_;
   push({Kind::lasting, 0, {std::nullopt, shared(std::move(text))}});
 }

@@ -45,7 +45,7 @@ class OutgoingQueue {
   void wake() { arrived_.notify(); }
   std::optional<Outgoing> pop();  // none waits
 
-  bool is_overrun() const { return lasting_ > kMaxLasting; }
+  bool is_overrun() const { return is_overrun_; }  // for good: a message that must arrive is lost
   std::size_t size() const { return queue_.size(); }
   std::uint64_t dropped() const { return dropped_; }  // so far
 
@@ -64,6 +64,7 @@ class OutgoingQueue {
   runtime::Clock& clock_;
   runtime::Signal arrived_;
   std::deque<Entry> queue_;
+  bool is_overrun_ = false;
   std::size_t lasting_ = 0, statuses_ = 0, data_ = 0, data_bytes_ = 0;
   std::uint64_t dropped_ = 0, reported_ = 0;
   std::int64_t report_due_us_ = 0;  // steady

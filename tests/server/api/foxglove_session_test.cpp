@@ -228,8 +228,10 @@ TEST_F(FoxgloveSessionTest, WhatWaitsIsBoundedInBytesStatusesAndChannels) {
   for (int i = 0; i < 1000; ++i) queue.push_status(StatusLevel::error, "no");
   EXPECT_EQ(queue.size(), OutgoingQueue::kMaxStatuses);
   for (int i = 0; i < 1000; ++i) queue.push_lasting("{}");
-  EXPECT_EQ(queue.size(), OutgoingQueue::kMaxStatuses + OutgoingQueue::kMaxLasting + 1);
-  EXPECT_TRUE(queue.is_overrun());
+  EXPECT_EQ(queue.size(), OutgoingQueue::kMaxStatuses + OutgoingQueue::kMaxLasting);
+  while (queue.pop()) {
+  }
+  EXPECT_TRUE(queue.is_overrun()) << "a channel is missing for good";
 }
 
 TEST_F(FoxgloveSessionTest, OfAFleetTheFirstRobotsAreShown) {

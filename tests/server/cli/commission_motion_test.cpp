@@ -142,6 +142,21 @@ TEST(CommissionMotion, JudgesNoDeadZoneWhereSamplesAreMissing) {
   EXPECT_THAT(finding.found, HasSubstr("samples are missing: 9 of 10"));
 }
 
+// With a rising edge less, an error of the bias looks like motion.
+TEST(CommissionMotion, JudgesNoDeadZoneByOneEdgeOfAPush) {
+  DeadZoneFacts facts;
+  facts.responses = responses_of(driven(pushes_profile(kPlan), 0.1, 0, 0.012), 0.012);
+  facts.tried = duties_in(pushes_profile(kPlan));
+  facts.responses.back().rising -= 1;
+  EXPECT_EQ(judge_dead_zone(facts).verdict, Verdict::not_done);
+}
+
+// SAFETY: a step that the station repeats takes the robot further than the way that somebody has looked at.
+TEST(CommissionMotion, NoticesARepeatedStep) {
+  EXPECT_FALSE(has_repeated_step({{"steps", {{{"step", 1}}, {{"step", 2}}}}}));
+  EXPECT_TRUE(has_repeated_step({{"steps", {{{"step", 1}}, {{"step", 2}}, {{"step", 2}}}}}));
+}
+
 TEST(CommissionMotion, TakesOnlyTheRobotsOwnWordForARefusedDuty) {
   const json record{{"state", "rejected"}, {"reason", "out_of_range"}};
   const auto answer = [](int status, const json& body) {
@@ -150,11 +165,11 @@ TEST(CommissionMotion, TakesOnlyTheRobotsOwnWordForARefusedDuty) {
     given.body = body;
     return given;
   };
-  EXPECT_EQ(refused_by_robot(answer(409, {{"reason", "out_of_range"}, {"command", record}})), std::optional{true});
-  EXPECT_EQ(refused_by_robot(answer(200, {{"state", "verified"}})), std::optional{false});
-  EXPECT_EQ(refused_by_robot(answer(422, {{"reason", "out_of_range"}})), std::nullopt) << "the station refused it";
-  EXPECT_EQ(refused_by_robot(answer(401, {{"reason", "no_token"}})), std::nullopt);
-  EXPECT_EQ(refused_by_robot(answer(409, {{"command", {{"state", "rejected"}, {"reason", "latched"}}}})), std::nullopt);
+  EXPECT_EQ(duty_answer(answer(409, {{"reason", "out_of_range"}, {"command", record}})), DutyAnswer::refused_by_robot);
+  EXPECT_EQ(duty_answer(answer(200, {{"state", "verified"}})), DutyAnswer::taken);
+  EXPECT_EQ(duty_answer(answer(422, {{"reason", "out_of_range"}})), DutyAnswer::refused_by_station);
+  EXPECT_EQ(duty_answer(answer(401, {{"reason", "no_token"}})), DutyAnswer::none);
+  EXPECT_EQ(duty_answer(answer(409, {{"command", {{"state", "rejected"}, {"reason", "latched"}}}})), DutyAnswer::none);
 }
 
 TEST(CommissionMotion, WantsAMotorWithoutReverseToRefuseBackwards) {
@@ -163,12 +178,14 @@ TEST(CommissionMotion, WantsAMotorWithoutReverseToRefuseBackwards) {
   DeadZoneFacts facts;
   facts.responses = responses_of(driven(pushes_profile(plan), 0.1, 0, 0.012), 0.012);
   facts.is_one_way = true;
-  facts.has_refused_backwards = true;
+  facts.backwards = DutyAnswer::refused_by_robot;
   EXPECT_EQ(judge_dead_zone(facts).verdict, Verdict::pass);
   EXPECT_THAT(judge_dead_zone(facts).found, HasSubstr("without reverse"));
-  facts.has_refused_backwards = false;
+  facts.backwards = DutyAnswer::taken;
   EXPECT_EQ(judge_dead_zone(facts).verdict, Verdict::fail);
-  facts.has_refused_backwards.reset();
+  facts.backwards = DutyAnswer::refused_by_station;
+  EXPECT_EQ(judge_dead_zone(facts).verdict, Verdict::attention) << "the robot was not asked, and need not be";
+  facts.backwards = DutyAnswer::none;
   EXPECT_EQ(judge_dead_zone(facts).verdict, Verdict::not_done) << "nobody asked the robot";
 }
 
