@@ -152,6 +152,7 @@ const steps = {
       return Math.abs(Number(time_s) - at_s) < 0.05;
     });
     const said = await until('the ± has come', async () => {
+      await look_at(at_s);
       const value = await text('.strip.position .cursor');
       return /±/.test(value) && value;
     });
