@@ -149,7 +149,7 @@ class PackageTest(unittest.TestCase):
         with subprocess.Popen(["nsenter", "-t", self.tree.init, "-n", str(BUILD / "bin/rheonaut-sim"), "--id", "sim-1",
                                "--station", "127.0.0.1:7070"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as robot:
             try:
-                self.tree.wait(lambda: any(robot["id"] == "sim-1" for robot in self.asked("GET", "robots")["robots"]), "the robot")
+                self.tree.wait(lambda: any(one["robot_id"] == "sim-1" for one in self.asked("GET", "robots")["robots"]), "the robot")
                 run = self.asked("POST", "runs", {"robot_id": "sim-1", "name": "exported"})["run_id"]
                 self.tree.wait(lambda: self.asked("GET", f"runs/{run}")["samples_stored"] > 100, "samples")
                 self.asked("POST", f"runs/{run}/end", {})
