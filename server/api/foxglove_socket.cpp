@@ -12,7 +12,9 @@
 #include <boost/beast/core/buffers_to_string.hpp>
 #include <boost/beast/core/flat_buffer.hpp>
 #include <boost/beast/websocket.hpp>
+#include <optional>
 
+#include "server/api/close_frame.hpp"
 #include "server/api/peer_watch.hpp"
 #include "server/http/target.hpp"
 
@@ -59,18 +61,27 @@ class FoxgloveClient {
     auto on_control = [this](websocket::frame_type, beast::string_view) { peer_.on_received(); };
     socket_.control_callback(std::move(on_control));
   }
-  ~FoxgloveClient() { clients_.feed.remove(session_); }
+  ~FoxgloveClient() {
+    clients_.feed.remove(session_);
+    if (closing_) write_close_frame(socket_.next_layer(), peer_, *closing_);
+  }
   FoxgloveClient(const FoxgloveClient&) = delete;
   FoxgloveClient& operator=(const FoxgloveClient&) = delete;
 
   asio::awaitable<void> run(http::UpgradeRequest upgrade) {
     const auto [error] = co_await socket_.async_accept(upgrade, asio::as_tuple(asio::use_awaitable));
     if (error) co_return;
+    closing_.emplace();  // how a task ends that is cancelled
     spdlog::info("Foxglove client of {} from {}", caller_.actor, caller_.peer);
     session_.begin("Rheonaut " + parts_.version, clients_.station_start);
     clients_.feed.add(session_, parts_.station.robots());
     co_await (part(read()) || part(write()) || part(watch()) || caller_.standing->wait_for_end());
-    if (caller_.standing->ended()) spdlog::info("the Foxglove client of {} was signed out", caller_.actor);
+    const bool is_cancelled =
+        (co_await asio::this_coro::cancellation_state).cancelled() != asio::cancellation_type::none;
+    if (!is_cancelled && closing_ && closing_->code == CloseCode::going_away) closing_ = kFault;
+    if (!caller_.standing->ended()) co_return;
+    closing_ = kSignedOut;
+    spdlog::info("the Foxglove client of {} was signed out", caller_.actor);
   }
 
  private:
@@ -80,11 +91,16 @@ class FoxgloveClient {
                      "Foxglove client of " + caller_.actor, std::move(task));
   }
 
+  // The other end has closed the connection, or it broke, unless this task was cancelled.
+  void leave(boost::system::error_code error) {
+    if (error != asio::error::operation_aborted) closing_.reset();
+  }
+
   asio::awaitable<void> read() {
     beast::flat_buffer buffer{foxglove::kMaxClientMessageBytes};
     for (;;) {
       const auto [error, size] = co_await socket_.async_read(buffer, asio::as_tuple(asio::use_awaitable));
-      if (error) co_return;
+      if (error) co_return leave(error);
       peer_.on_received();
       if (peer_.is_too_talkative()) co_await parts_.clock.sleep_until(peer_.resume_at_us());
       const std::string message = beast::buffers_to_string(buffer.data());
@@ -98,7 +114,7 @@ class FoxgloveClient {
     }
   }
 
-  asio::awaitable<bool> send(const foxglove::Outgoing& outgoing) {
+  asio::awaitable<boost::system::error_code> send(const foxglove::Outgoing& outgoing) {
     if (!parts_.turns.take()) co_await parts_.turns.wait();
     const std::array pieces{outgoing.head ? asio::buffer(*outgoing.head) : asio::const_buffer{},
                             asio::buffer(*outgoing.body)};
@@ -106,7 +122,7 @@ class FoxgloveClient {
     peer_.on_write_begun();
     const auto [error, size] = co_await socket_.async_write(pieces, asio::as_tuple(asio::use_awaitable));
     peer_.on_written();
-    co_return !error;
+    co_return error;
   }
 
   asio::awaitable<void> write() {
@@ -114,15 +130,18 @@ class FoxgloveClient {
     for (;;) {
       co_await queue.wait();
       for (auto outgoing = queue.pop(); outgoing; outgoing = queue.pop()) {
-        const bool is_sent = co_await send(*outgoing);
-        if (!is_sent || queue.is_overrun()) co_return;
+        const auto failed = co_await send(*outgoing);
+        if (failed) co_return leave(failed);
+        if (!queue.is_overrun()) continue;
+        closing_ = kTooSlow;
+        co_return;
       }
       if (!peer_.take_ping()) continue;
       const websocket::ping_data empty;
       peer_.on_write_begun();
       const auto [error] = co_await socket_.async_ping(empty, asio::as_tuple(asio::use_awaitable));
       peer_.on_written();
-      if (error) co_return;
+      if (error) co_return leave(error);
     }
   }
 
@@ -130,6 +149,7 @@ class FoxgloveClient {
   asio::awaitable<void> watch() {
     const auto wake = [this] { session_.queue().wake(); };
     co_await peer_.wait_for_silence(wake);
+    closing_ = kSilent;
     spdlog::info("the Foxglove client of {} fell silent, or does not read", caller_.actor);
   }
 
@@ -139,6 +159,7 @@ class FoxgloveClient {
   LiveParts& parts_;
   foxglove::Session session_;
   PeerWatch peer_;
+  std::optional<Closing> closing_;  // what to end with; none: the other end has closed the connection
 };
 
 }  // namespace

@@ -10,8 +10,10 @@
 #include <boost/beast/core/buffers_to_string.hpp>
 #include <boost/beast/core/flat_buffer.hpp>
 #include <boost/beast/websocket.hpp>
+#include <optional>
 
 #include "server/api/bodies/json.hpp"
+#include "server/api/close_frame.hpp"
 #include "server/api/peer_watch.hpp"
 
 namespace server::api {
@@ -38,16 +40,25 @@ class LivePage {
     auto on_control = [this](websocket::frame_type, beast::string_view) { peer_.on_received(); };
     socket_.control_callback(std::move(on_control));
   }
-  ~LivePage() { parts_.live.remove(queue_); }
+  ~LivePage() {
+    parts_.live.remove(queue_);
+    if (closing_) write_close_frame(socket_.next_layer(), peer_, *closing_);
+  }
   LivePage(const LivePage&) = delete;
   LivePage& operator=(const LivePage&) = delete;
 
   asio::awaitable<void> run(http::UpgradeRequest upgrade) {
     const auto [error] = co_await socket_.async_accept(upgrade, asio::as_tuple(asio::use_awaitable));
     if (error) co_return;
+    closing_.emplace();       // how a task ends that is cancelled
     parts_.live.add(queue_);  // what changes while the welcome is written is queued after it
     co_await (part(read()) || part(write()) || part(watch()) || caller_.standing->wait_for_end());
-    if (caller_.standing->ended()) spdlog::info("the page of {} was signed out", caller_.actor);
+    const bool is_cancelled =
+        (co_await asio::this_coro::cancellation_state).cancelled() != asio::cancellation_type::none;
+    if (!is_cancelled && closing_ && closing_->code == CloseCode::going_away) closing_ = kFault;
+    if (!caller_.standing->ended()) co_return;
+    closing_ = kSignedOut;
+    spdlog::info("the page of {} was signed out", caller_.actor);
   }
 
  private:
@@ -85,11 +96,16 @@ class LivePage {
                 "not_permitted");
   }
 
+  // The other end has closed the connection, or it broke, unless this task was cancelled.
+  void leave(boost::system::error_code error) {
+    if (error != asio::error::operation_aborted) closing_.reset();
+  }
+
   asio::awaitable<void> read() {
     beast::flat_buffer buffer{kMaxMessageBytes};
     for (;;) {
       const auto [error, size] = co_await socket_.async_read(buffer, asio::as_tuple(asio::use_awaitable));
-      if (error) co_return;
+      if (error) co_return leave(error);
       peer_.on_received();
       // Each of its messages may become a task.
       if (peer_.is_too_talkative()) co_await parts_.clock.sleep_until(peer_.resume_at_us());
@@ -104,7 +120,7 @@ class LivePage {
   }
 
   // One message, in as many frames as it has pieces.
-  asio::awaitable<bool> write_welcome() {
+  asio::awaitable<boost::system::error_code> write_welcome() {
     live::RobotDocument welcome = welcome_message(caller_.actor, parts_);
     while (!welcome.is_whole()) {
       const std::string piece = co_await welcome.next();
@@ -113,14 +129,14 @@ class LivePage {
       const auto [error, size] = co_await socket_.async_write_some(welcome.is_whole(), asio::buffer(piece),
                                                                    asio::as_tuple(asio::use_awaitable));
       peer_.on_written();
-      if (error) co_return false;
+      if (error) co_return error;
     }
-    co_return true;
+    co_return boost::system::error_code{};
   }
 
   asio::awaitable<void> write() {
-    const bool is_welcomed = co_await write_welcome();
-    if (!is_welcomed) co_return;
+    const auto failed = co_await write_welcome();
+    if (failed) co_return leave(failed);
     for (;;) {
       co_await queue_.wait();
       for (live::LiveText message = queue_.pop(); message != nullptr; message = queue_.pop()) {
@@ -129,14 +145,14 @@ class LivePage {
         const auto [error, size] =
             co_await socket_.async_write(asio::buffer(*message), asio::as_tuple(asio::use_awaitable));
         peer_.on_written();
-        if (error) co_return;
+        if (error) co_return leave(error);
       }
       if (!peer_.take_ping()) continue;
       const websocket::ping_data empty;
       peer_.on_write_begun();
       const auto [error] = co_await socket_.async_ping(empty, asio::as_tuple(asio::use_awaitable));
       peer_.on_written();
-      if (error) co_return;
+      if (error) co_return leave(error);
     }
   }
 
@@ -144,6 +160,7 @@ class LivePage {
   asio::awaitable<void> watch() {
     const auto nothing = [] {};
     co_await peer_.wait_for_silence(nothing);
+    closing_ = kSilent;
     spdlog::info("the page of {} fell silent, or does not read", caller_.actor);
   }
 
@@ -152,6 +169,7 @@ class LivePage {
   LiveParts& parts_;
   live::Subscriber queue_;
   PeerWatch peer_;
+  std::optional<Closing> closing_;  // what to end with; none: the other end has closed the connection
 };
 
 }  // namespace

@@ -31,6 +31,7 @@ class PeerWatch {
 
   void on_write_begun() { writing_since_us_ = clock_.steady_us(); }
   void on_written() { writing_since_us_ = kNever; }
+  bool is_writing() const { return writing_since_us_ != kNever; }
 
   // True when it is to be pinged now; then not again for a while.
   bool take_ping() {

@@ -84,9 +84,9 @@ const Upgrade* HttpConnection::wanted_upgrade(const Request& request, const Requ
   return &found->second;
 }
 
-bool HttpConnection::begin_page(const identity::Caller& caller) {
+bool HttpConnection::begin_page(const std::string& path, const identity::Caller& caller) {
   std::erase_if(upgrades_.open, [](const auto& of_one) { return of_one.second == 0; });
-  std::size_t& pages = upgrades_.open[caller.user.empty() ? caller.actor : caller.user];
+  std::size_t& pages = upgrades_.open[path + " of " + (caller.user.empty() ? caller.actor : caller.user)];
   if (pages >= kMaxPagesOfOne) return false;
   page_.emplace(pages);
   return true;
@@ -108,13 +108,20 @@ asio::awaitable<Next> HttpConnection::read_and_answer() {
   parser.body_limit(boost::none);  // is set when it is known whose body it is
   Request head;
   boost::system::error_code error;
-  buffer_.consume(parser.put(buffer_.data(), error));  // most come in one piece: no turn of the loop is spent on them
-  if (error == http::error::need_more) {
-    std::tie(error, std::ignore) =
-        co_await http::async_read_header(stream_, buffer_, parser, asio::as_tuple(asio::use_awaitable));
+  take_head(parser, error);  // most come in one piece: no turn of the loop is spent on them
+  while (error == http::error::need_more) {
+    std::size_t size = 0;
+    std::tie(error, size) =
+        co_await stream_.async_read_some(buffer_.prepare(kReadBytes), asio::as_tuple(asio::use_awaitable));
+    if (error) break;
+    buffer_.commit(size);
+    take_head(parser, error);
   }
-  if (!error && has_unknown_length(parser)) error = http::error::bad_transfer_encoding;
   if (!error) {
+    if (has_two_hosts(parser.get())) {
+      co_return co_await send_and_close(problem(400, "the request has two Host headers", "malformed_http"),
+                                        parser.release());
+    }
     head = plain_head(parser.get());
     if (router_.is_stop(head.method, head.target)) co_return co_await carry_out_stop(parser, std::move(head));
     auto refusal = refusal_of(parser, head);
@@ -131,6 +138,16 @@ asio::awaitable<Next> HttpConnection::read_and_answer() {
   const Next next = co_await carry_out(std::move(head), fields.release(parser));
   if (next == Next::another) slot_.rest();
   co_return next;
+}
+
+// Gives the parser what has arrived, until the head is whole (no error) or refused. It takes nothing of a part of a
+// head.
+void HttpConnection::take_head(RequestParser& parser, boost::system::error_code& error) {
+  const std::size_t size = parser.put(buffer_.data(), error);
+  const std::string_view head{static_cast<const char*>(buffer_.data().data()), size};
+  if (!error && has_folded_line(head)) error = http::error::bad_obs_fold;
+  if (!error && has_unknown_length(parser)) error = http::error::bad_transfer_encoding;
+  buffer_.consume(size);
 }
 
 // SAFETY: what came while the loop stood still is as old as its last turn before, and so is what came behind it.
@@ -194,7 +211,7 @@ asio::awaitable<Next> HttpConnection::carry_out(Request request, RequestMessage 
       if (!let_in) co_return co_await sender_.send(std::move(let_in.error()), message);
       admit(request, std::move(*let_in));
     }
-    if (!begin_page(request.caller)) {
+    if (!begin_page(request.target.path(), request.caller)) {
       Response refused = problem(429, fmt::format("{} has {} pages open; close some", request.actor, kMaxPagesOfOne),
                                  "too_many_pages");
       co_return co_await sender_.send(std::move(refused), message);

@@ -35,7 +35,7 @@
 
 namespace server::http {
 
-inline constexpr std::size_t kMaxPagesOfOne = 32;  // WebSockets, of one user, token or link
+inline constexpr std::size_t kMaxPagesOfOne = 32;  // WebSockets at one path, of one user, token or link
 inline constexpr microseconds kRequestTime{std::chrono::seconds{10}};
 inline constexpr microseconds kLongBodyTime{std::chrono::seconds{60}};
 inline constexpr microseconds kIdleTime{std::chrono::seconds{60}};
@@ -73,8 +73,9 @@ class HttpConnection {
   boost::asio::awaitable<void> discard_rest();
 
   void note_arrival();
+  void take_head(RequestParser& parser, boost::system::error_code& error);
   const Upgrade* wanted_upgrade(const Request& request, const RequestMessage& message) const;  // null: none
-  bool begin_page(const identity::Caller& caller);  // false: there are too many of one
+  bool begin_page(const std::string& path, const identity::Caller& caller);  // false: there are too many of one
 
   HttpStream stream_;
   net::ConnectionSlot& slot_;

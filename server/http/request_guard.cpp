@@ -44,8 +44,12 @@ bool has_json_body(const Request& request) {
   return request.body.empty() || content_type.substr(0, content_type.find(';')) == "application/json";
 }
 
-std::unexpected<Response> refuse_body() {
-  return refuse(415, "the body must be application/json", "wrong_content_type");
+// What is wrong with the body's type or its coding, if there is one.
+std::optional<std::unexpected<Response>> refusal_of_body(const Request& request) {
+  if (!has_json_body(request)) return refuse(415, "the body must be application/json", "wrong_content_type");
+  const std::string coding = lower(request.header("content-encoding"));
+  if (request.body.empty() || coding.empty() || coding == "identity") return std::nullopt;
+  return refuse(415, "the body must be sent without Content-Encoding", "wrong_content_encoding");
 }
 
 }  // namespace
@@ -86,7 +90,6 @@ std::optional<RequestGuard::Credential> RequestGuard::credential_of(const Reques
   }
   const std::string cookies = request.header("cookie");
   auto caller = auth_.caller_of_session(cookie_value(cookies, auth_.cookie_name()));
-  if (!caller) caller = auth_.caller_of_session(cookie_value(cookies, identity::kOldSessionCookie));
   return caller ? std::optional{Credential{std::move(*caller), true}} : std::nullopt;
 }
 
@@ -107,7 +110,7 @@ std::expected<identity::Caller, Response> RequestGuard::admit(const Request& req
   const bool holds_data = live || path == "/metrics" || path.starts_with("/api/");
   if (!holds_data && !changes_something(request)) return identity::Caller{};
   if (request.method == "POST" && path == kLoginPath) {
-    if (!has_json_body(request)) return refuse_body();
+    if (auto refusal = refusal_of_body(request)) return std::move(*refusal);
     return identity::Caller{};
   }
 
@@ -120,7 +123,7 @@ std::expected<identity::Caller, Response> RequestGuard::admit(const Request& req
     return refuse(403, "a request by cookie must say that it comes from the station's own page (Origin)",
                   "wrong_origin");
   }
-  if (!has_json_body(request)) return refuse_body();
+  if (auto refusal = refusal_of_body(request)) return std::move(*refusal);
   if (live && !credential->caller.scopes.allow(identity::Scope::read)) {
     return std::unexpected{not_permitted(credential->caller, identity::Scope::read)};
   }

@@ -24,8 +24,15 @@ Request plain_head(const RequestMessage& message) {
     if (!value.empty()) value += name == "cookie" ? "; " : ", ";
     value += field.value();
   }
+  if (!request.target.authority().empty()) request.headers["host"] = request.target.authority();
   return request;
 }
+
+bool has_folded_line(std::string_view head) {
+  return head.find("\r\n ") != std::string_view::npos || head.find("\r\n\t") != std::string_view::npos;
+}
+
+bool has_two_hosts(const RequestMessage& message) { return message.count(http::field::host) > 1; }
 
 bool has_unknown_length(const RequestParser& parser) {
   return parser.get().count(http::field::transfer_encoding) > 0 && !parser.chunked();

@@ -7,6 +7,7 @@
 #include <boost/beast/http/string_body.hpp>
 #include <cstddef>
 #include <optional>
+#include <string_view>
 
 #include "server/http/http.hpp"
 
@@ -20,8 +21,15 @@ inline constexpr std::size_t kMaxLoginBodyBytes = 4 * 1024;  // of unauthenticat
 using RequestMessage = boost::beast::http::request<boost::beast::http::string_body>;
 using RequestParser = boost::beast::http::request_parser<boost::beast::http::string_body>;
 
-// All but the body. Repeated fields are joined.
+// All but the body. Repeated fields are joined; the host is that of the target where it names one.
 Request plain_head(const RequestMessage& message);
+
+// Whether a line of the head begins with a blank (obs-fold of RFC 9112, section 5.2). Beast joins it to the line
+// before; another program on the way may take it for a field of its own, and read another length of the body.
+bool has_folded_line(std::string_view head);
+
+// Which of them names the station is in doubt (RFC 9112, section 3.2).
+bool has_two_hosts(const RequestMessage& message);
 
 // The length of what follows the header is not known: Beast takes a coding that it does not know for no body at all.
 bool has_unknown_length(const RequestParser& parser);

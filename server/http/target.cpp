@@ -1,6 +1,8 @@
 #include "server/http/target.hpp"
 
 #include <algorithm>
+#include <cctype>
+#include <tuple>
 #include <utility>
 
 namespace server::http {
@@ -25,6 +27,19 @@ std::vector<std::string> path_segments(std::string_view path) {
     segment = std::move(*decoded);
   }
   return segments;
+}
+
+// The authority, and what is behind it; none when the text does not begin with a scheme of HTTP.
+std::optional<std::pair<std::string, std::string>> absolute_form(const std::string& text) {
+  for (const std::string_view scheme : {"http://", "https://"}) {
+    const auto same = [](char a, char b) { return std::tolower(static_cast<unsigned char>(a)) == b; };
+    if (!std::ranges::equal(text.substr(0, scheme.size()), scheme, same)) continue;
+    const auto end = std::min(text.find_first_of("/?", scheme.size()), text.size());
+    std::string behind = text.substr(end);
+    if (!behind.starts_with('/')) behind.insert(behind.begin(), '/');
+    return std::pair{text.substr(scheme.size(), end - scheme.size()), std::move(behind)};
+  }
+  return std::nullopt;
 }
 
 }  // namespace
@@ -59,10 +74,10 @@ std::optional<std::string> percent_decode(std::string_view text, bool plus_is_sp
   return out;
 }
 
-Target::Target(std::string text)
-    : text_{std::move(text)},
-      path_size_{std::min(text_.find('?'), text_.size())},
-      segments_{path_segments(std::string_view{text_}.substr(0, path_size_))} {
+Target::Target(std::string text) : text_{std::move(text)} {
+  if (auto absolute = absolute_form(text_)) std::tie(authority_, text_) = std::move(*absolute);
+  path_size_ = std::min(text_.find('?'), text_.size());
+  segments_ = path_segments(std::string_view{text_}.substr(0, path_size_));
   for (const std::string& segment : segments_) path_ += "/" + segment;
 }
 

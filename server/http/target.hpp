@@ -1,6 +1,8 @@
-// The target of a request: its text as it was sent, and its path and query, which are parsed here alone.
+// The target of a request: its text, and its path and query, which are parsed here alone.
 //
-// Checks of the path use path() or segments(), never the text.
+// The absolute form, "http://station:8080/api", is taken as the path and query behind its authority; what authority()
+// names then stands in the place of the Host header (RFC 9112, section 3.2.2). Checks of the path use path() or
+// segments(), never the text.
 #pragma once
 
 #include <optional>
@@ -17,7 +19,8 @@ class Target {
   Target(std::string text);  // NOLINT(google-explicit-constructor): a target is written as its text
   Target(const char* text) : Target{std::string{text}} {}  // NOLINT(google-explicit-constructor)
 
-  const std::string& text() const { return text_; }
+  const std::string& text() const { return text_; }            // from its path on
+  const std::string& authority() const { return authority_; }  // empty when it is not in the absolute form
   bool is_acceptable() const { return !segments_.empty(); }
   // Of the path, split and then decoded; at least one. None, and an empty path, when it is not acceptable.
   const std::vector<std::string>& segments() const { return segments_; }
@@ -27,6 +30,7 @@ class Target {
   std::optional<Query> query() const;
 
  private:
+  std::string authority_;
   std::string text_;
   std::size_t path_size_ = 0;  // of the text: what follows is the query with its question mark
   std::vector<std::string> segments_;

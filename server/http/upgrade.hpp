@@ -29,7 +29,7 @@ struct Upgrade {
 // Outlives the connections.
 struct Upgrades {
   std::map<std::string, Upgrade> at;             // by path
-  std::map<std::string, std::size_t> open = {};  // connections, of each user, token or link
+  std::map<std::string, std::size_t> open = {};  // connections, by path and user, token or link
 };
 
 }  // namespace server::http

@@ -47,7 +47,7 @@ Auth::Auth(boost::asio::io_context& loop, runtime::Clock& clock, Accounts& accou
            std::uint64_t store_id)
     : clock_{clock},
       accounts_{accounts},
-      cookie_name_{fmt::format("{}_{:016x}", kOldSessionCookie, store_id)},
+      cookie_name_{fmt::format("rheonaut_session_{:016x}", store_id)},
       token_{runtime::hash_of(load_or_make_token(data_dir / "rheonaut.token"))},
       token_standing_{std::make_shared<Standing>(loop)} {}
 
@@ -81,7 +81,7 @@ std::optional<Caller> Auth::caller_of_session(const std::string& secret) const {
 }
 
 std::string Auth::cookie(const std::string& secret, bool is_secure) const {
-  const auto life_s = secret.empty() ? 0 : kCookieValidity.count() / 1'000'000;
+  const auto life_s = secret.empty() ? 0 : kSessionValidity.count() / 1'000'000;
   return fmt::format("{}={}; HttpOnly; SameSite=Strict; Path=/; Max-Age={}{}", cookie_name_, secret, life_s,
                      is_secure ? "; Secure" : "");
 }

@@ -15,10 +15,7 @@
 namespace server::identity {
 
 inline constexpr microseconds kLoginCodeValidity{std::chrono::minutes{10}};
-inline constexpr microseconds kCookieValidity{
-    std::chrono::days{30}};  // in the browser; the station decides what it is worth
 inline constexpr std::size_t kMaxLoginCodes = 16;
-inline constexpr const char* kOldSessionCookie = "rheonaut_session";  // of stations before there were accounts
 
 class Auth {
  public:
@@ -37,7 +34,8 @@ class Auth {
 
   // Browsers do not separate cookies of one host by port, so each station has a name of its own.
   const std::string& cookie_name() const { return cookie_name_; }
-  // The value of Set-Cookie; an empty secret ends it. `is_secure`: for TLS only.
+  // The value of Set-Cookie, which lasts as long as the session does without being used; an empty secret ends it.
+  // `is_secure`: for TLS only.
   std::string cookie(const std::string& secret, bool is_secure) const;
 
  private:

@@ -83,9 +83,7 @@ void knock(const std::string& text) {
   const http::Request request = request_of(text, house);
   const std::string cookies = request.header("cookie");
   const std::string own = first_cookie(cookies, house.auth.cookie_name());
-  const std::string old = first_cookie(cookies, identity::kOldSessionCookie);
   require(http::cookie_value(cookies, house.auth.cookie_name()) == own);
-  require(http::cookie_value(cookies, identity::kOldSessionCookie) == old);
 
   const auto admitted = house.guard.admit(request);
   if (!admitted) {

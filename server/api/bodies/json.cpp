@@ -6,7 +6,11 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <functional>
 #include <limits>
+#include <set>
+#include <string>
+#include <vector>
 
 namespace server::api {
 
@@ -46,6 +50,24 @@ bool is_nested_too_deep(const std::string& text) {
   return false;
 }
 
+// Of each object the name of a member that comes twice: nlohmann's parser keeps the last one and forgets the others.
+class RepeatedMembers {
+ public:
+  bool operator()(int, json::parse_event_t event, const json& parsed) {
+    using Event = json::parse_event_t;
+    if (event == Event::object_start) names_.emplace_back();
+    if (event == Event::object_end) names_.pop_back();
+    if (event == Event::key && !names_.back().insert(parsed.get<std::string>()).second && first_.empty())
+      first_ = quote(parsed);
+    return true;
+  }
+  const std::string& first() const { return first_; }  // quoted; empty: there is none
+
+ private:
+  std::vector<std::set<std::string>> names_;  // of the objects that are open
+  std::string first_;
+};
+
 }  // namespace
 
 Result<Members> Members::parse(const std::string& text, std::initializer_list<const char*> known) {
@@ -53,10 +75,15 @@ Result<Members> Members::parse(const std::string& text, std::initializer_list<co
     return fail(ErrorCode::bad_request, fmt::format("the body is nested deeper than {} levels", kMaxJsonDepth),
                 "malformed_json");
   }
-  json value = json::parse(text, nullptr, false);
+  RepeatedMembers repeated;
+  json value = json::parse(text, std::ref(repeated), false);
   if (value.is_discarded()) {
     return fail(ErrorCode::bad_request, "the body is not valid JSON (JSON has no NaN and no Infinity)",
                 "malformed_json");
+  }
+  if (!repeated.first().empty()) {
+    return fail(ErrorCode::bad_request, fmt::format("{} is given twice in one object", repeated.first()),
+                "repeated_member");
   }
   if (!value.is_object()) return fail(ErrorCode::bad_request, "the body is not a JSON object", "malformed_json");
   Members members{std::move(value)};

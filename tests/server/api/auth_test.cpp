@@ -250,10 +250,10 @@ TEST_F(RequestGuardTest, NamesWhoAsks) {
   EXPECT_EQ(guard.admit(request("GET", "/"))->actor, "");
 }
 
-TEST_F(RequestGuardTest, TakesTheCookieOfAnOlderStationAndNotThatOfAnother) {
+TEST_F(RequestGuardTest, TakesItsOwnCookieAndNotThatOfAnotherStationOrAnOlderOne) {
   http::Request asked = request("GET", "/api/v1/robots");
   asked.headers["cookie"] = "rheonaut_session=" + session;
-  EXPECT_EQ(status(asked), 200);
+  EXPECT_EQ(status(asked), 401);
   asked.headers["cookie"] = "rheonaut_session_fedcba9876543211=" + session;
   EXPECT_EQ(status(asked), 401);
   asked.headers["cookie"] = "rheonaut_session_fedcba9876543211=other; rheonaut_session_fedcba9876543210=" + session;

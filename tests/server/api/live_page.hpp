@@ -55,6 +55,7 @@ class Page {
 
   std::string answer;
   int pings = 0;
+  int close_code = 0;  // 0: the station has sent none
   bool answers_pings = true;
 
  private:
@@ -84,7 +85,10 @@ class Page {
         size = extended;
       }
       const std::string payload = client_.read_exactly(size);
-      if (head[0] == '\x88') return std::nullopt;
+      if (head[0] == '\x88') {
+        close_code = static_cast<unsigned char>(payload.at(0)) * 256 + static_cast<unsigned char>(payload.at(1));
+        return std::nullopt;
+      }
       if (head[0] == '\x89') {
         ++pings;
         if (answers_pings) send_frame('\x8a', payload);

@@ -77,6 +77,7 @@ TEST_F(LiveRightsTest, ARevokedSessionEndsItsPagesAndNoOther) {
   EXPECT_EQ(ask("POST", "/api/v1/sessions/" + std::to_string(number) + "/revoke").status, 200);
   EXPECT_EQ(ask("POST", "/api/v1/sessions/" + std::to_string(number) + "/revoke").status, 404);
   EXPECT_TRUE(ends(*page));
+  EXPECT_EQ(page->close_code, 1008);
   EXPECT_TRUE(ends(*twin));
   EXPECT_FALSE(other->closed());
   EXPECT_TRUE(open_by_cookie(mine)->answer.starts_with("HTTP/1.1 401 "));

@@ -174,6 +174,7 @@ TEST_F(LiveSocketTest, RefusesAMessageOverFourKilobytes) {
   const auto page = open_page();
   page->say_text(std::string(5000, ' '));
   page->receive("nothing");
+  EXPECT_EQ(page->close_code, 1009);
   EXPECT_TRUE(page->closed());
 }
 
@@ -182,6 +183,7 @@ TEST_F(LiveSocketTest, LetsASilentPageGo) {
   page->answers_pings = false;
   clock.run_for(31s);
   page->receive("nothing");
+  EXPECT_EQ(page->close_code, 1008);
   EXPECT_GE(page->pings, 1);
   EXPECT_TRUE(page->closed());
 }
@@ -239,6 +241,7 @@ TEST_F(LiveSocketTest, EndsWhenTheStationStopsAndWhenThePageLeaves) {
   tasks.stop();
   clock.settle();
   page->receive("nothing");
+  EXPECT_EQ(page->close_code, 1001);
   EXPECT_TRUE(page->closed());
 }
 

@@ -15,8 +15,8 @@ class StopFormTest : public ApiTest {
 
   std::string bearer() const { return "Authorization: Bearer " + token() + "\r\n"; }
   std::string cookie() {
-    return "Cookie: " + std::string{identity::kOldSessionCookie} + "=" +
-           api->accounts().open_session("", "127.0.0.1", "") + "\r\n";
+    const std::string secret = api->accounts().open_session("", "127.0.0.1", "");
+    return "Cookie: rheonaut_session_fedcba9876543210=" + secret + "\r\n";
   }
   static std::string post(const std::string& target, const std::string& headers) {
     return "POST " + target + " HTTP/1.1\r\nHost: localhost\r\n" + headers + "\r\n";

@@ -24,6 +24,18 @@ TEST(Target, IsNotAcceptableWhereItsPathCouldMeanAnotherOne) {
   }
 }
 
+TEST(Target, OfTheAbsoluteFormHasAnAuthority) {
+  const http::Target target{"HTTP://lab-pc:8080/api/v1/robots?x=1"};
+  EXPECT_EQ(target.authority(), "lab-pc:8080");
+  EXPECT_EQ(target.text(), "/api/v1/robots?x=1");
+  EXPECT_EQ(target.path(), "/api/v1/robots");
+  EXPECT_EQ(http::Target{"https://lab-pc"}.path(), "/");
+  EXPECT_EQ(http::Target{"http://lab-pc?x=1"}.query(), (http::Target::Query{{"x", "1"}}));
+  EXPECT_EQ(http::Target{"http://a@b/x"}.authority(), "a@b");
+  EXPECT_FALSE(http::Target{"ftp://lab-pc/x"}.is_acceptable());
+  EXPECT_EQ(http::Target{"/http://lab-pc/x"}.authority(), "");
+}
+
 TEST(Target, QueryKeepsOrderAndRepeatedNames) {
   EXPECT_EQ(http::Target{"/a?x=1&y&x=a+b&=c&&z=1=2"}.query(),
             (http::Target::Query{{"x", "1"}, {"y", ""}, {"x", "a b"}, {"", "c"}, {"", ""}, {"z", "1=2"}}));
