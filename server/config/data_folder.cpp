@@ -9,9 +9,10 @@
 #include <unistd.h>
 
 #include <cstring>
-#include <fstream>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
+
+#include "server/runtime/private_file.hpp"
 
 namespace server::config {
 namespace asio = boost::asio;
@@ -31,7 +32,7 @@ FolderLock take_lock(const std::filesystem::path& folder) {
 
 std::optional<FolderLock> FolderLock::try_take(const std::filesystem::path& folder) {
   const auto path = folder / "rheonaut.lock";
-  const int file = open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600);
+  const int file = open(path.c_str(), O_RDWR | O_CREAT | O_NOFOLLOW | O_CLOEXEC, 0600);
   if (file < 0) throw std::runtime_error{fmt::format("cannot open '{}': {}", path.string(), std::strerror(errno))};
   if (flock(file, LOCK_EX | LOCK_NB) == 0) return FolderLock{file};
   close(file);
@@ -49,6 +50,7 @@ void make_data_folder(const std::filesystem::path& path) {
   if (error)
     throw std::runtime_error{fmt::format("cannot make the data folder '{}': {}", path.string(), error.message())};
   if (made) std::filesystem::permissions(path, std::filesystem::perms::owner_all);
+  runtime::require_own_folder(path);
 }
 
 DataFolder::DataFolder(std::filesystem::path path) : path_{std::move(path)}, lock_{take_lock(path_)} {
@@ -73,13 +75,12 @@ asio::awaitable<void> DataFolder::announce(runtime::Clock& clock, Announcement a
 }
 
 bool DataFolder::write_endpoints(const std::string& content) const {
-  const auto draft = path_ / "endpoints.json.new";
-  std::ofstream out{draft};
-  out << content;
-  out.close();
-  std::error_code error;
-  if (out) std::filesystem::rename(draft, endpoints(), error);
-  return out && !error;
+  try {
+    runtime::write_private(endpoints(), content);
+    return true;
+  } catch (const std::runtime_error&) {
+    return false;
+  }
 }
 
 }  // namespace server::config

@@ -62,7 +62,7 @@ class DataFolder {
 };
 
 // Takes from everyone else the rights on whatever the program makes from now on, and makes the folder when it is
-// missing. Throws std::runtime_error that names it.
+// missing. Throws std::runtime_error that names it, also when it is not ours (runtime::require_own_folder).
 void make_data_folder(const std::filesystem::path& path);
 
 }  // namespace server::config

@@ -4,12 +4,6 @@
 #include <fmt/format.h>
 #include <sodium.h>
 #include <spdlog/spdlog.h>
-#include <sys/stat.h>
-
-#include <cerrno>
-#include <cstring>
-#include <fstream>
-#include <stdexcept>
 
 #include "server/runtime/private_file.hpp"
 
@@ -18,25 +12,14 @@ namespace {
 
 namespace fs = std::filesystem;
 
-[[noreturn]] void cannot(const char* what, const fs::path& file) {
-  throw std::runtime_error{std::string{"cannot "} + what + " " + file.string() + ": " + std::strerror(errno)};
-}
-
 std::string load_or_make_token(const fs::path& file) {
-  std::string token;
-  std::ifstream in{file};
-  std::getline(in, token);
-  if (runtime::is_secret(token)) {
-    struct stat status{};
-    if (::stat(file.c_str(), &status) != 0) cannot("look at", file);
-    if ((status.st_mode & 077U) != 0) {
-      spdlog::warn("{} was readable by others (mode {:o}); now it is not", file.string(), status.st_mode & 0777U);
-      if (::chmod(file.c_str(), 0600) != 0) cannot("protect", file);
-    }
-    return token;
+  const auto content = runtime::read_private(file);
+  if (content) {
+    std::string token = content->substr(0, content->find('\n'));
+    if (runtime::is_secret(token)) return token;
+    spdlog::warn("{} held no valid token; a new one was made", file.string());
   }
-  if (fs::exists(file)) spdlog::warn("{} held no valid token; a new one was made", file.string());
-  token = runtime::random_secret();
+  std::string token = runtime::random_secret();
   runtime::write_private(file, token + "\n");
   return token;
 }

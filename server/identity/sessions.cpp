@@ -4,7 +4,9 @@
 #include <sodium.h>
 
 #include <algorithm>
-#include <fstream>
+#include <sstream>
+
+#include "server/runtime/private_file.hpp"
 
 namespace server::identity {
 namespace {
@@ -29,7 +31,7 @@ void Sessions::load(const std::vector<PageSession>& stored, std::uint64_t next_n
 
 // One session a line: number, end (UTC, µs), hash in hexadecimal. A line that is none ends the reading.
 std::size_t Sessions::take_over(const std::filesystem::path& file) {
-  std::ifstream in{file};
+  std::istringstream in{runtime::read_private(file).value_or("")};
   PageSession session;
   std::string hex;
   std::size_t taken = 0;

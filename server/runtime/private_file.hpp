@@ -1,7 +1,14 @@
-// Files that hold secrets: written completely or not at all, and readable by their owner only.
+// Files that hold secrets: written completely or not at all, and readable by their owner only; and who may have written
+// what is read.
+//
+// SAFETY: a token or session that another user of the machine has put there would let that user drive the robots.
+// Trusted are this user and root; root trusts the service's user "rheonaut", too.
 #pragma once
 
+#include <sys/stat.h>
+
 #include <filesystem>
+#include <optional>
 #include <string>
 
 namespace server::runtime {
@@ -9,5 +16,14 @@ namespace server::runtime {
 // The whole file or nothing appears under its name, readable by its owner only from the first moment; what was there
 // before is replaced. Throws std::runtime_error that names the file.
 void write_private(const std::filesystem::path& file, const std::string& content);
+
+// The file's content; none when there is no such file. A file that others may read is protected first, with a warning.
+// Throws std::runtime_error that names it, with what to type, when it is a link or no file, belongs to somebody who is
+// not trusted, or may be written by all users.
+std::optional<std::string> read_private(const std::filesystem::path& file);
+
+// Throws std::runtime_error that names the folder, with what to type, when it belongs to somebody who is not trusted or
+// may be written by all users; warns when its group may write.
+void require_own_folder(const std::filesystem::path& folder);
 
 }  // namespace server::runtime
