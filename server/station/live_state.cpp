@@ -19,6 +19,7 @@ void begin_boot(RobotEntry& entry) {
   entry.commands.unknown.clear();  // what the boot before knew of them is gone
   entry.timed.by.clear();
   entry.timed.until_robot_us = entry.timed.drop_id = 0;
+  entry.timed.is_of_earlier_run = false;
 }
 
 void show_hello(RobotState& robot, const AdmissionRequest& hello, const protocol::Hello& details,

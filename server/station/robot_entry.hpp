@@ -24,6 +24,7 @@ struct TimedOrders {
   const char* drop_because = nullptr;  // why they have to be dropped; null: they need not
   bool has_lost_a_step = false;        // the robot dropped a setpoint of its own accord: another may have built on it
   CommandId drop_id = 0;               // that drops them, until it is acknowledged; 0: none
+  bool is_of_earlier_run = false;  // nobody knows whether one waits: the station has restarted since this boot began
 };
 
 struct RobotEntry {

@@ -41,6 +41,7 @@ void Station::on_connected(RobotLink& link, const AdmissionRequest& hello, const
   RobotState& robot = entry.robot;
   if (RobotLink* previous = RobotTable::connect(entry, link); previous != nullptr) {
     previous->close(fmt::format("replaced by a connection from {}", peer));
+    parts_->tracker.end_with_link(entry, "link_lost");  // SAFETY: what it was sent last may not have arrived
     parts_->notifier.note(robot, "connection_replaced", fmt::format("{} takes the place of {}", peer, robot.peer));
   }
   const bool lost_its_latch = robot.latched() && robot.boot_id != hello.boot_id && details.emergency_id == 0;

@@ -35,9 +35,11 @@ void Station::add_sink(StationSink& sink) { parts_->notifier.add(sink); }
 void Station::restore(const std::vector<RestoredRobot>& robots, const std::vector<CommandRecord>& pending_stops,
                       const std::vector<Reservation>& reservations) {
   for (const RestoredRobot& restored : robots) {
-    RobotState& robot = parts_->robots.add(restored.id).robot;
+    RobotEntry& entry = parts_->robots.add(restored.id);
+    RobotState& robot = entry.robot;
     robot.boot_id = restored.boot_id;
-    robot.context.emergency_id = restored.emergency_id;  // SAFETY: the station's latch outlives the station
+    entry.timed.is_of_earlier_run = restored.boot_id != 0;  // SAFETY: whose they are is not known any more
+    robot.context.emergency_id = restored.emergency_id;     // SAFETY: the station's latch outlives the station
     robot.retired_at_us = restored.retired_at_us;
     restore_fluid(robot, restored.fluid, parts_->envelope);
   }

@@ -45,7 +45,8 @@ void TimedCommands::drop_all(RobotEntry& entry, const std::string& holder, const
 
 void TimedCommands::choose_reason(RobotEntry& entry, const std::string& holder) const {
   TimedOrders& timed = entry.timed;
-  const bool may_wait = !timed.by.empty() && entry.robot.latest_robot_time_us <= timed.until_robot_us + kDueGraceUs;
+  const bool is_ahead = entry.robot.latest_robot_time_us <= timed.until_robot_us + kDueGraceUs;
+  const bool may_wait = timed.is_of_earlier_run || (!timed.by.empty() && is_ahead);
   if (!may_wait) timed.drop_because = nullptr;
   const bool has_lost_a_step = std::exchange(timed.has_lost_a_step, false);
   if (may_wait && has_lost_a_step && has_timed_setpoint(entry)) timed.drop_because = "step_before_dropped";
@@ -62,6 +63,7 @@ bool TimedCommands::send_drop(RobotEntry& entry) {
   if (!entry.link->send(drop->wire, drop->deadline_us)) return false;
   entry.timed.by.clear();
   entry.timed.until_robot_us = 0;
+  entry.timed.is_of_earlier_run = false;
   entry.timed.drop_because = nullptr;
   entry.timed.drop_id = drop->record.id;
   entry.commands.add(drop);

@@ -1,0 +1,95 @@
+"""What a real station and robot have recorded is an execution of the model; a forged record is none."""
+import copy
+import pathlib
+import signal
+import sys
+import tempfile
+import unittest
+
+sys.path.append(str(pathlib.Path(__file__).resolve().parents[1] / "system"))
+
+import check  # noqa: E402
+import trace  # noqa: E402
+from processes import commanded, lab, wait_until  # noqa: E402
+
+
+class ReplayTest(unittest.TestCase):
+    def robot(self):
+        return self.station.robot("sim-1")
+
+    def until(self, condition, what):
+        return wait_until(lambda: condition(self.robot()) and self.robot(), 60, what)
+
+    def other_operator(self):
+        made = self.station.post("/api/v1/tokens", {"name": "other", "scopes": "admin"})
+        other = copy.copy(self.station)
+        other.token = made["secret"]
+        return other
+
+    def stop_and_clear(self):
+        stopped = self.station.post("/api/v1/robots/sim-1/emergency-stop")
+        self.until(lambda robot: robot["mode"] == "emergency" and not robot["pending_stop"], "latched")
+        commanded(self.station, "clear_emergency", emergency_id=stopped["emergency_id"])
+        self.until(lambda robot: robot["mode"] == "manual", "cleared")
+
+    def swim(self, setpoint_m):
+        commanded(self.station, "set_mode", mode="auto", setpoint_m=setpoint_m)
+        self.until(lambda robot: robot["sample"]["duty"] != 0, "the motor runs")
+
+    def record(self, place):
+        """Stop, clear, takeover, lapse of a lease, lost link with a pending stop, kill of the station."""
+        self.station = place.start_station()
+        robot = place.start_robot(self.station)
+        self.station.wait_for_robot("sim-1")
+        other = self.other_operator()
+        self.swim(0.3)
+        self.stop_and_clear()
+        other.post("/api/v1/robots/sim-1/control", {"action": "force", "reason": "a test"})
+        commanded(other, "set_duty", duty=0.2)
+        wait_until(lambda: any(event["kind"] == "lease_lapsed" for event in
+                               self.station.get("/api/v1/robots/sim-1/events")["events"]), 60, "the lease has lapsed")
+        robot.send_signal(signal.SIGSTOP)
+        try:
+            self.until(lambda robot: robot["link"] == "disconnected", "the link is lost")
+            self.station.post("/api/v1/robots/sim-1/emergency-stop")
+            ports = self.station.endpoints
+            place.kill_station()
+            self.station = place.start_station(http=ports["http"], robots=ports["robots"])
+        finally:
+            robot.send_signal(signal.SIGCONT)
+        latched = self.until(lambda robot: robot["mode"] == "emergency" and not robot["pending_stop"], "stopped")
+        commanded(self.station, "clear_emergency", emergency_id=latched["emergency_id"])
+        self.swim(-0.1)
+        self.stop_and_clear()
+        self.assertEqual(place.stop_station(), 0)
+        return trace.actions(place.data / "station.sqlite", "sim-1")
+
+    def test_a_real_record_is_allowed_and_forged_ones_are_not(self):
+        with lab() as place, tempfile.TemporaryDirectory() as folder:
+            robot, station = self.record(place)
+            print(f"robot: {robot}\nstation: {station}", flush=True)
+            model = check.Model(folder)
+            self.assertTrue(trace.is_allowed(model, robot, station))
+            kinds = [action for action, _ in robot]
+            for kind in ("stop", "clear", "MOVING", "duty", "automatic", "LAPSE"):
+                self.assertIn(kind, kinds)
+
+            first_clear = kinds.index("clear")
+            moved_before_the_clear = robot[:first_clear] + [("MOVING", 0)] + robot[first_clear:]
+            self.assertFalse(trace.is_allowed(model, moved_before_the_clear, station), "motion after a stop")
+            without_clear = robot[:first_clear] + robot[first_clear + 1:]
+            self.assertFalse(trace.is_allowed(model, without_clear, station), "no clear at all")
+
+            duty = kinds.index("duty")
+            of_the_former = robot[:duty + 1] + [("automatic", robot[0][1])] + robot[duty + 1:]
+            sent = station.index(("duty", 2))
+            self.assertFalse(trace.is_allowed(model, of_the_former, station), "a command that nobody sent")
+            both = station[:sent + 1] + [("automatic", 1)] + station[sent + 1:]
+            self.assertFalse(trace.is_allowed(model, of_the_former, both), "a command of the former holder of control")
+            lapse = kinds.index("LAPSE")
+            self.assertFalse(trace.is_allowed(model, robot[:lapse + 1] + [("MOVING", 0)] + robot[lapse + 1:], station),
+                             "motion after its lease has lapsed")
+
+
+if __name__ == "__main__":
+    unittest.main()
