@@ -64,11 +64,12 @@ def missing_test(root, known, cell):
 def faults(root):
     text = (root / PAGE).read_text(encoding="utf-8")
     known = googletests(root)
-    rows, others = set(), set()
-    for number, rest in ROW.findall(text):
+    hazards = re.search(r"^## Hazards$.*?(?=^## |\Z)", text, re.M | re.S).group(0)
+    rows = set()
+    for number, rest in ROW.findall(hazards):
         cells = [cell.strip() for cell in rest.split(" | ")]
-        if len(cells) != COLUMNS:  # the tables of the other guards and of what was measured name a row of a failure
-            others.add(number)
+        if len(cells) != COLUMNS:
+            yield f"row {number} has {1 + len(cells)} columns"
             continue
         if number in rows:
             yield f"row {number} stands there twice"
@@ -82,6 +83,8 @@ def faults(root):
             wrong = missing_test(root, known, cell)
             if wrong:
                 yield f"row {number}: {wrong}"
+    # The tables of what was measured and of the other guards name a row of these.
+    others = {number for number, _ in ROW.findall(text.replace(hazards, ""))}
     yield from (f"there is no row {number}" for number in sorted(others - rows))
     listed, there = collections.Counter(GUARD.findall(text)), marks(root)
     for path, words in sorted((there - listed).elements()):

@@ -9,7 +9,7 @@ from check_safety import faults
 ROW = '| 1.1 | it goes on | `robot_fw/a.cpp`: "off at once" | `Stop.Acts`<br>`tests/system/stop_test.py test_all`<br>' \
       '`web/tests/a.ts` "it stops" | 10 ms |\n'
 FILES = {
-    "docs/safety.md": ROW + '| 1.1 | `server/b.hpp`: "first" |\n',
+    "docs/safety.md": "## Hazards\n" + ROW + '## The others\n| 1.1 | `server/b.hpp`: "first" |\n',
     "robot_fw/a.cpp": "int a;  // SAFETY: off at once\n",
     "server/b.hpp": "// Sends. SAFETY: first\n",
     "tests/CMakeLists.txt": "a_test.cpp\n",
@@ -55,10 +55,11 @@ class CheckSafety(unittest.TestCase):
 
     def test_rows_are_complete_and_stand_once(self):
         page = FILES["docs/safety.md"]
-        self.assertEqual(found(docs__safety_dot_md=page + "| 1.2 | 3 ms | 4 mm |\n"), ["there is no row 1.2"])
-        self.assertEqual(found(docs__safety_dot_md=page + "| 1.2 | it goes on |  | `Stop.Waits` | 1 s |\n"), ["row 1.2 names no guard"])
-        self.assertIn("row 1.2 has no bound", found(docs__safety_dot_md=page + '| 1.2 | x | - | `Stop.Waits` |  |\n'))
-        self.assertIn("row 1.1 stands there twice", found(docs__safety_dot_md=page + ROW))
+        self.assertEqual(found(docs__safety_dot_md=page + "| 1.2 | 3 ms | 4 mm | 5 | 6 |\n"), ["there is no row 1.2"])
+        self.assertEqual(
+            found(docs__safety_dot_md=page.replace("## The", "| 1.2 | it goes on |  | `Stop.Waits` | 1 s |\n## The")), ["row 1.2 names no guard"])
+        self.assertIn("row 1.2 has no bound", found(docs__safety_dot_md=page.replace("## The", "| 1.2 | x | - | `Stop.Waits` |  |\n## The")))
+        self.assertIn("row 1.1 stands there twice", found(docs__safety_dot_md=page.replace("## The", ROW + "## The")))
 
 
 if __name__ == "__main__":
