@@ -146,6 +146,8 @@ std::vector<Case> cases() {
   return {
       {"1.9", "a stop arrives at the robot", 0, false, false, [](Trial&) {},
        [](Trial& trial) { trial.station.send(emergency_stop()); }, nullptr, true},
+      {"1.11", "a switch cuts the motor's supply, until the robot has sensed it", 10, false, false, [](Trial&) {},
+       [](Trial& trial) { trial.robot.world().cut_motor_supply(true); }},
       {"2.1", "auto: nothing comes from the station any more, the connection stays open", 1010, false, true,
        [](Trial&) {}, [](Trial& trial) { trial.is_attentive = false; }},
       {"2.1", "auto: the station was killed, its connections close", 1010, false, true, [](Trial&) {},
