@@ -143,6 +143,7 @@ const char* text(EmergencyCause value) {
     case rheonaut_EMERGENCY_CAUSE_TIME_AT_POWER: return "time_at_power";
     case rheonaut_EMERGENCY_CAUSE_INTERNAL_ERROR: return "internal_error";
     case rheonaut_EMERGENCY_CAUSE_RESET: return "reset";
+    case rheonaut_EMERGENCY_CAUSE_MOTOR_SUPPLY_CUT: return "motor_supply_cut";
   }
   return "unknown";
 }
@@ -190,6 +191,7 @@ const char* text(EventCause value) {
     case rheonaut_EVENT_CAUSE_INTERNAL: return "internal";
     case rheonaut_EVENT_CAUSE_RESET: return "reset";
     case rheonaut_EVENT_CAUSE_TIME: return "time";
+    case rheonaut_EVENT_CAUSE_MOTOR_SUPPLY: return "motor_supply";
   }
   return "unknown";
 }

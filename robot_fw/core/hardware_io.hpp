@@ -23,6 +23,7 @@ struct Inputs {
 
   float impedance_mv = 0;  // of the electrode; 0 when it could not be read
   float supply_mv = 0;
+  bool motor_supply_is_cut = false;  // behind a switch that cuts the motor's supply; without a wire to sense it: false
   std::int32_t rssi_dbm = 0;
   std::uint32_t free_memory_bytes = 0;
   std::uint32_t tick_us = 0;          // how long the last tick took

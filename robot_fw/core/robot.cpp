@@ -64,6 +64,7 @@ Outputs Robot::step(const Inputs& inputs, float dt_s) {
 
   motion_sense_.step(inputs, duty_, dt_s, missed_s);
   watch_sensors();
+  watch_supply();
   watch_link();
   run_due_commands();
   let_orders_run_out();

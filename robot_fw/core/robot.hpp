@@ -98,6 +98,7 @@ class Robot {
   void on_sensor_news(SensorFault fault, protocol::EventCause which, float reading);
   SensorFault electrode_fault() const;
   bool sensor_fault_stands() const;
+  void watch_supply();
   void watch_link();
   void watch_limits(const Motion& measured, float dt_s);
   void watch_certainty(float wanted_duty);

@@ -195,7 +195,9 @@ Verdict Robot::set_duty_schedule(const rheonaut_SetDutySchedule& order) {
 Verdict Robot::clear_emergency(std::uint64_t emergency_id, std::uint64_t command_id) {
   if (emergency_id != safety_.emergency_id()) return rejected(rheonaut_REJECT_REASON_OTHER_EMERGENCY);
   const bool sensor_cause_stands = safety_.has_sensor_cause() && sensor_fault_stands();
-  if (!inputs_are_sound_ || sensor_cause_stands) return rejected(rheonaut_REJECT_REASON_CAUSE_STANDS);
+  // SAFETY: nobody clears anything while the motor's supply is cut, or the robot would move when it is back.
+  const bool cause_stands = sensor_cause_stands || inputs_.motor_supply_is_cut;
+  if (!inputs_are_sound_ || cause_stands) return rejected(rheonaut_REJECT_REASON_CAUSE_STANDS);
   safety_.clear(emergency_id);  // into manual at rest: the stop ended every order, and the latch let none in
   note(rheonaut_EVENT_KIND_EMERGENCY_CLEARED, rheonaut_EVENT_CAUSE_COMMAND, 0, command_id);
   return kAccepted;

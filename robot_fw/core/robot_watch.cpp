@@ -53,6 +53,13 @@ bool Robot::sensor_fault_stands() const {
   return motion_sense_.fault() != SensorFault::none || electrode_fault() != SensorFault::none;
 }
 
+// Somebody has cut the motor's supply. What was ordered would otherwise go on the moment that it is back.
+void Robot::watch_supply() {
+  // SAFETY: the motor comes back when a person clears this, never with its supply alone.
+  if (!inputs_.motor_supply_is_cut || safety_.latched()) return;
+  emergency(rheonaut_EMERGENCY_CAUSE_MOTOR_SUPPLY_CUT, rheonaut_EVENT_CAUSE_MOTOR_SUPPLY, 0);
+}
+
 void Robot::watch_link() {
   if (!channel_.goes_lost(now_us_)) return;
   note(rheonaut_EVENT_KIND_LINK_LOST, rheonaut_EVENT_CAUSE_LINK_LOSS, 0);

@@ -34,6 +34,7 @@ Board::Board(const Secrets& secrets, const Settings& settings)
       motor_(settings.motor),
       imu_(settings.imu),
       analogue_(settings.analogue),
+      motor_supply_pin_(settings.motor_supply.sense_pin),
       led_(settings.led),
       link_(secrets, clock_) {}
 
@@ -43,6 +44,7 @@ void Board::begin() {
   // SAFETY: without memory there is no robot: no tick completes, so nothing ever raises the motor's pin.
   if (!place_samples()) return;
   analogue_.begin();
+  if (motor_supply_pin_ != kNoPin) pinMode(static_cast<std::uint8_t>(motor_supply_pin_), INPUT_PULLUP);
   latch_.begin();
   storage_.begin();
   link_.begin();
@@ -98,6 +100,8 @@ Inputs Board::read_inputs(std::uint64_t robot_time_us) {
   inputs.imu_calibration = reading.calibration;
   inputs.impedance_mv = analogue_.impedance_mv();
   inputs.supply_mv = analogue_.supply_mv();
+  inputs.motor_supply_is_cut =
+      motor_supply_pin_ != kNoPin && digitalRead(static_cast<std::uint8_t>(motor_supply_pin_)) == HIGH;
   inputs.rssi_dbm = link_.rssi_dbm();
   inputs.free_memory_bytes = ESP.getFreeHeap();
   inputs.tick_us = tick_us_;

@@ -52,6 +52,7 @@ class Board {
   TickSchedule ticks_{kTickUs};
   Bno055 imu_;
   AnalogueInputs analogue_;
+  const std::int8_t motor_supply_pin_;
   StatusLed led_;
   LatchMemory latch_;
   FlashStorage storage_{motor_};

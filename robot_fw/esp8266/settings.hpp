@@ -28,6 +28,11 @@ struct AnalogueSettings {
   float supply_scale = 5.7F;        // supply's mV per mV at the pin: 47 kΩ over 10 kΩ
 };
 
+// A transistor pulls the line low while the motor has its supply. High: a switch has cut it, or the line is broken.
+struct MotorSupplySettings {
+  std::int8_t sense_pin = kNoPin;  // 12 is free; none: not sensed
+};
+
 struct LedSettings {
   std::uint8_t pin = 2;
   bool lit_when_low = true;
@@ -38,6 +43,7 @@ struct Settings {
   ImuSettings imu;
   AnalogueSettings analogue;
   LedSettings led;
+  MotorSupplySettings motor_supply;
 };
 
 constexpr Settings kSettings{};

@@ -52,12 +52,26 @@ enum class FaultKind {
   block,
   clock_drift,
   clock_jump,
+  motor_supply_cut,
 };
 
 // As a profile of an experiment names it: docs/experiments.md, conditions.pump.
 enum class PumpSetting : std::uint8_t { off, constant, pulse_70_bpm };
 
-enum class FaultTarget { accelerometer, electrode, pump, glucose, link, delay, rate, loss, split, robot, clock };
+enum class FaultTarget {
+  accelerometer,
+  electrode,
+  pump,
+  glucose,
+  link,
+  delay,
+  rate,
+  loss,
+  split,
+  robot,
+  clock,
+  motor_supply
+};
 
 struct FaultType {
   const char* name;  // as in FaultKind

@@ -133,6 +133,7 @@ void apply(const Fault& fault, const FaultyRobot& robot) {
       return world.set_fault(Sensor::electrode, sensor_fault(fault, FaultKind::electrode_stuck));
     case FaultTarget::pump: return drive_pump(fault, world);
     case FaultTarget::glucose: return pour(fault, world);
+    case FaultTarget::motor_supply: return world.cut_motor_supply(true);
     default: return upset(fault, robot.life);
   }
 }
@@ -151,6 +152,7 @@ void end(const Fault& fault, const FaultyRobot& robot) {
     }
     case FaultTarget::robot: return robot.life.unblock();
     case FaultTarget::clock: return robot.life.drift(config.clock_drift_ppm);
+    case FaultTarget::motor_supply: return world.cut_motor_supply(false);
     default: return;
   }
 }

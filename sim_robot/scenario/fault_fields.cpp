@@ -33,8 +33,9 @@ constexpr std::array kTypes{
     FaultType{"block", robot, true, "its loop does nothing else for so long: ticks are missed"},
     FaultType{"clock_drift", clock, true, "its clock goes too fast or too slow"},
     FaultType{"clock_jump", clock, false, "its clock alone jumps"},
+    FaultType{"motor_supply_cut", motor_supply, true, "a switch cuts the motor's supply; the robot senses it"},
 };
-static_assert(kTypes.size() == static_cast<std::size_t>(FaultKind::clock_jump) + 1);
+static_assert(kTypes.size() == static_cast<std::size_t>(FaultKind::motor_supply_cut) + 1);
 
 constexpr std::array<const char*, 3> kDirections{"up", "down", "both"};
 constexpr std::array<const char*, 6> kCauses{"unknown", "power_on", "software", "watchdog", "brown_out", "external"};

@@ -38,7 +38,7 @@ World::World(const WorldConfig& config)
 
 void World::step(double duty) {
   const double velocity_before_m_s = velocity_m_s_;
-  const double driven = motor_.driven(duty);
+  const double driven = motor_supply_is_cut_ ? 0 : motor_.driven(duty);
   battery_.step(driven);
   plant_.step(motor_.step(driven, battery_.supply_ratio()));
   position_m_ = plant_.position_m();
@@ -89,6 +89,7 @@ robot_fw::Inputs World::read(std::uint64_t robot_time_us) {
   }
   inputs.impedance_mv = static_cast<float>(electrode_.read(impedance_mv()));
   inputs.supply_mv = static_cast<float>(supply_mv());
+  inputs.motor_supply_is_cut = motor_supply_is_cut_;
   inputs.imu_calibration = kImuCalibration;
   return inputs;
 }

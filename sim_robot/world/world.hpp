@@ -52,6 +52,8 @@ class World {
   void set_mean_flow_m3_s(double flow_m3_s);
   void set_flow(PumpKind kind, double mean_flow_m3_s);  // the same with another kind
   void pour(const GlucosePatch& patch) { glucose_.pour(patch); }
+  // The switch in the motor's supply: the motor gets nothing while it is open, and the robot senses it.
+  void cut_motor_supply(bool is_cut) { motor_supply_is_cut_ = is_cut; }
 
   // The truth. Positions from where the robot booted.
   void prefetch() const { plant_.prefetch(); }  // see SimulatedRobot
@@ -83,6 +85,7 @@ class World {
   double flow_velocity_m_s_ = 0;
   double position_m_ = 0, velocity_m_s_ = 0, acceleration_m_s2_ = 0;
   bool is_at_wall_ = false;
+  bool motor_supply_is_cut_ = false;
 };
 
 }  // namespace sim_robot

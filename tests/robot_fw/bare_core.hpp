@@ -64,6 +64,7 @@ class BareCore {
     if (known_position_m) inputs.known_motion = Motion{*known_position_m, 0, 0};
     inputs.impedance_mv = impedance_mv;
     inputs.supply_mv = supply_mv;
+    inputs.motor_supply_is_cut = motor_supply_is_cut;
     return inputs;
   }
 
@@ -136,6 +137,7 @@ class BareCore {
   std::optional<float> known_position_m;  // of a perfect sensor
   float impedance_mv = 175;
   float supply_mv = 3000;
+  bool motor_supply_is_cut = false;
 
   protocol::Hello hello = rheonaut_Hello_init_zero;
   protocol::Telemetry sample = rheonaut_Telemetry_init_zero;  // the last one

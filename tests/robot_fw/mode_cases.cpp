@@ -255,6 +255,14 @@ const std::vector<EventCase> kEventCases{
        core.step(earlier);
        core.step(core.inputs());  // the time at which it went back
      }},
+    {"the motor's supply is cut, and comes back",
+     {},
+     [](BareCore& core) {
+       core.motor_supply_is_cut = true;
+       core.run(20);
+       core.motor_supply_is_cut = false;
+       core.tick();
+     }},
     {"reset: power on", {}, [](BareCore& core) { reset(core, rheonaut_RESET_CAUSE_POWER_ON, false); }},
     {"reset: software", {}, [](BareCore& core) { reset(core, rheonaut_RESET_CAUSE_SOFTWARE, true); }},
     {"reset: external", {}, [](BareCore& core) { reset(core, rheonaut_RESET_CAUSE_EXTERNAL, true); }},

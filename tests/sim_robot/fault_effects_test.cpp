@@ -1,4 +1,5 @@
 // The faults of link and robot by time line, in virtual time: what the robot makes of them, and how they end.
+// LONG: one test for each fault, told in the words of one fixture.
 #include <gmock/gmock.h>
 
 #include "sim_robot/lab/lab.hpp"
@@ -390,6 +391,17 @@ TEST_F(FaultEffects, AClockThatJumpsBackLatches) {
   run_to(2.1);
   EXPECT_EQ(core().mode(), rheonaut_MODE_EMERGENCY);
   EXPECT_EQ(core().emergency_cause(), rheonaut_EMERGENCY_CAUSE_INTERNAL_ERROR);
+}
+
+TEST_F(FaultEffects, AMotorSupplyThatIsCutStopsTheRobotAndItStaysStoppedAfterwards) {
+  Fault cut = fault_of(FaultKind::motor_supply_cut);
+  cut.for_s = 1;
+  begin_in_auto({{2, cut}});
+  run_to(2.05);
+  EXPECT_EQ(core().emergency_cause(), rheonaut_EMERGENCY_CAUSE_MOTOR_SUPPLY_CUT);
+  run_to(6);
+  EXPECT_EQ(core().mode(), rheonaut_MODE_EMERGENCY) << "the supply has been back for 3 s";
+  EXPECT_EQ(core().duty(), 0);
 }
 
 }  // namespace

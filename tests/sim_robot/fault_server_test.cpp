@@ -116,7 +116,7 @@ TEST_F(FaultServerWithANetwork, TakesEveryFaultThereIsAndEndsThoseThatLast) {
     network_.step();
   }
   const Json in_force = body_of(request("GET", "/faults")).at("in_force");
-  EXPECT_EQ(in_force.size(), 10u) << "one of each target that lasts: " << in_force;
+  EXPECT_EQ(in_force.size(), 11u) << "one of each target that lasts: " << in_force;
   for (const Json& each : in_force) {
     EXPECT_THAT(request("DELETE", "/faults/" + each.at("id").dump()), StartsWith("HTTP/1.1 204 "));
   }

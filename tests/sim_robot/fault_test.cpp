@@ -53,9 +53,10 @@ TEST(FaultJson, SaysWhatIsWrongWhichValueAndWhatIsAllowed) {
 }
 
 TEST(FaultTypes, ReadBackWhatTheTableSaysOfEachKind) {
-  EXPECT_EQ(fault_types().size(), static_cast<std::size_t>(FaultKind::clock_jump) + 1);
+  EXPECT_EQ(fault_types().size(), static_cast<std::size_t>(FaultKind::motor_supply_cut) + 1);
   EXPECT_STREQ(type_of(FaultKind::link_outage).name, "link_outage");
   EXPECT_STREQ(type_of(FaultKind::clock_jump).name, "clock_jump");
+  EXPECT_STREQ(type_of(FaultKind::motor_supply_cut).name, "motor_supply_cut");
   EXPECT_STREQ(type_of(FaultKind::electrode_missing).name, "electrode_missing");
 }
 

@@ -153,6 +153,25 @@ TEST_F(LinkFaultsTest, TheNextSampleAfterAnEmergencyStopHasDuty0) {
   EXPECT_GT(after, 100);
 }
 
+// SAFETY: a button in the motor's supply needs neither station nor link, and lets nothing move when it is let go.
+TEST_F(LinkFaultsTest, AMotorSupplyThatIsCutStopsTheRobotAndOnlyAClearLetsItGoOn) {
+  begin();
+  go_to(0.5);
+  await(duty().above(0.5), {.limit_s = 0.3});
+  robot->world().cut_motor_supply(true);
+  expect_event("emergency", {.within_s = 1});
+  expect(in_emergency());
+  EXPECT_EQ(state().context.emergency_cause, rheonaut_EMERGENCY_CAUSE_MOTOR_SUPPLY_CUT);
+  send(sim_robot::clear_emergency(state().context.emergency_id)).expect_refused("cause_stands");
+  robot->world().cut_motor_supply(false);
+  holds(in_truth(motor_off()), {.for_s = 3});
+  expect(in_emergency());
+  clear();
+  pass(1);
+  expect(in_manual());
+  expect(in_truth(motor_off()));
+}
+
 TEST_F(LinkFaultsTest, AStopDuringAnOutageReachesTheRobotFirst) {
   begin();
   go_to(0.5);

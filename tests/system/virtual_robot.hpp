@@ -27,6 +27,7 @@ class VirtualRobot {
   void stall(bool stalled);  // half-open: nothing arrives on either side
 
   const sim_robot::SimulatedRobot& simulated() const { return robot_; }
+  sim_robot::World& world() { return robot_.world(); }  // for faults while it runs
   const robot_fw::Robot& core() const { return robot_.core(); }
   const sim_robot::SimulatedRobotConfig& config() const { return robot_.config(); }
   bool connected() const { return link_ != nullptr; }

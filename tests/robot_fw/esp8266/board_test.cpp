@@ -258,5 +258,25 @@ TEST_F(BoardTest, DirectionPinAllowsNegativeDuties) {
   EXPECT_EQ(board->robot().duty(), 0) << "without one";
 }
 
+TEST_F(BoardTest, AHighLineOfTheMotorsSupplyStopsTheRobotWhetherItIsCutOrBroken) {
+  Settings settings;
+  settings.motor_supply.sense_pin = 12;
+  connect(settings);
+  drive(0.5F);
+  EXPECT_GT(motor_high_us([this] { run_ms(20); }), 0U);
+  chip.pins[12].driven_high = true;
+  run_ms(11);
+  EXPECT_EQ(board->robot().emergency_cause(), rheonaut_EMERGENCY_CAUSE_MOTOR_SUPPLY_CUT);
+  chip.pins[12].driven_high = false;
+  EXPECT_EQ(motor_high_us([this] { run_ms(500); }), 0U) << "the supply alone starts nothing";
+}
+
+TEST_F(BoardTest, WithoutALineOfTheMotorsSupplyNoPinIsRead) {
+  chip.pins[12].driven_high = true;
+  connect();
+  drive(0.5F);
+  EXPECT_GT(motor_high_us([this] { run_ms(20); }), 0U);
+}
+
 }  // namespace
 }  // namespace robot_fw::esp8266

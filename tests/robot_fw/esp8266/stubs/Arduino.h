@@ -11,7 +11,7 @@
 #define clockCyclesPerMicrosecond() (F_CPU / 1000000L)
 
 constexpr std::uint8_t LOW = 0, HIGH = 1;
-constexpr std::uint8_t INPUT = 0, OUTPUT = 1;
+constexpr std::uint8_t INPUT = 0, OUTPUT = 1, INPUT_PULLUP = 2;
 constexpr std::uint8_t A0 = 17;
 
 // A register that sets or clears the pins written to it.
@@ -30,6 +30,7 @@ unsigned long micros();
 std::uint32_t esp_get_cycle_count();
 void pinMode(std::uint8_t pin, std::uint8_t mode);
 void digitalWrite(std::uint8_t pin, std::uint8_t level);
+int digitalRead(std::uint8_t pin);
 int analogRead(std::uint8_t pin);
 
 class EspClass {

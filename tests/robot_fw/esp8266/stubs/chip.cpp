@@ -74,6 +74,7 @@ void pinMode(std::uint8_t pin, std::uint8_t mode) {
   if (chip.level(pin)) ++chip.pins[pin].rises;
 }
 void digitalWrite(std::uint8_t pin, std::uint8_t level) { chip.pins[pin].latch = level != LOW; }
+int digitalRead(std::uint8_t pin) { return chip.pins[pin].driven_high ? HIGH : LOW; }
 int analogRead(std::uint8_t) {
   const bool supply = chip.supply_pin >= 0 && chip.level(chip.supply_pin);
   return supply ? chip.analogue_with_supply : chip.analogue;

@@ -17,8 +17,9 @@ constexpr std::uint32_t kFlashSectorBytes = 4096;
 
 struct Pin {
   bool output = false;
-  bool latch = false;  // as a soft reset leaves it
-  int rises = 0;       // when it became an output, its latch high
+  bool latch = false;        // as a soft reset leaves it
+  bool driven_high = false;  // an input, from outside
+  int rises = 0;             // when it became an output, its latch high
   std::uint64_t high_us = 0;
 };
 
