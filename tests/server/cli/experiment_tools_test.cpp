@@ -60,6 +60,18 @@ TEST_F(Discretising, ListsWhatItRefused) {
   EXPECT_THAT(ask("discretise --period-s 0.001 --order 1").text, HasSubstr("refused: the direct method"));
 }
 
+TEST_F(Discretising, PrintsTheControllerAsSourceText) {
+  EXPECT_THAT(ask("discretise --code c").text, HasSubstr("double rheonaut_controller_step("));
+  EXPECT_THAT(ask("discretise --code matlab").text, testing::StartsWith("function [duty, state] = "));
+  EXPECT_EQ(ask("discretise --code c --json").exit_code, 2);
+}
+
+TEST_F(Discretising, SaysWhenTheCoefficientsAreNotTheControllerAnyMore) {
+  EXPECT_TRUE(ask("discretise --json").json()["warnings"].empty());
+  EXPECT_THAT(ask("discretise --period-s 0.1 --method direct").text, HasSubstr("warning: below 25.1 rad/s"));
+  EXPECT_EQ(ask("discretise --period-s 0.1 --method direct --json").json()["warnings"].size(), 1u);
+}
+
 class Predicting : public ToolTest {};
 
 TEST_F(Predicting, GivesTheReferenceMetrics) {
