@@ -204,5 +204,15 @@ TEST_F(Identifying, APlanPredictsTheUncertaintyOfAnExperiment) {
   EXPECT_EQ(ask("identify --plan --plan-dt-s 1e-9").exit_code, 2);
 }
 
+// A robot that does not move, with a sensor that trembles.
+TEST_F(Identifying, ARunThatTheModelDoesNotExplainEndsWithStatus4) {
+  std::string csv = "t_s,duty,velocity_m_s\n";
+  for (int k = 0; k < 200; ++k) csv += fmt::format("{},0.3,{}\n", 0.01 * k, 1e-3 * ((k * 7919) % 101 - 50));
+  save("still.csv", csv);
+  const Answer answer = ask("identify --csv @still.csv --structure first_order");
+  EXPECT_EQ(answer.exit_code, 4);
+  EXPECT_THAT(answer.error, HasSubstr("of the run, so its parameters say nothing"));
+}
+
 }  // namespace
 }  // namespace server::cli
