@@ -159,7 +159,8 @@ std::optional<AmplitudeEvidence> amplitude_evidence(OutputErrorSearch& search, c
   const Qr by_changing = directions(beyond(by_linear, changing), kDependent);
   if (by_changing.rank() == 0 || by_changing.maxPivot() < kDependent) return std::nullopt;
   const VectorXd rest = beyond(by_changing, residual);
-  const Index values = path ? path->weighed_samples() - path->bias_terms() : residual.size();
+  Index values = path ? -path->bias_terms() : 0;
+  for (const VectorXd& of_channel : residuals) values += search.counted(of_channel).size();
   const double explained = residual.squaredNorm() - rest.squaredNorm();
   const double freedom = static_cast<double>(values - by_linear.rank() - by_changing.rank());
   if (!(freedom > 0)) return std::nullopt;

@@ -15,16 +15,11 @@ using Eigen::Index;
 constexpr double kSmallestResidualShare = 1e-9;  // of the signal; what is less is rounding and no reason to choose
 constexpr double kWhite = 0.01;
 
-// Without those of readings that have no weight, which are 0 and no measurement.
-Eigen::VectorXd with_weight(const OutputErrorSearch& search, const Eigen::VectorXd& residual) {
-  return search.sensor() ? search.sensor()->with_weight(residual) : residual;
-}
-
 double akaike(const OutputErrorSearch& search, Cost cost, const std::vector<Eigen::VectorXd>& residuals,
               const std::vector<const std::vector<double>*>& measured, int free_parameters) {
   double sum = 2.0 * free_parameters;
   for (std::size_t c = 0; c < residuals.size(); ++c) {
-    const double n = static_cast<double>(with_weight(search, residuals[c]).size());
+    const double n = static_cast<double>(search.counted(residuals[c]).size());
     const Eigen::Map<const Eigen::VectorXd> y(measured[c]->data(), residuals[c].size());
     const double floor = kSmallestResidualShare * std::sqrt((y.array() - y.mean()).square().mean());
     const double sd = std::max(floor, residuals[c].norm() / std::sqrt(n));
@@ -44,11 +39,11 @@ void add_uncertainty(OutputErrorSearch& search, const SearchPoint& point, const 
   for (std::size_t c = 0; c < jacobians.size(); ++c) {
     const Index samples = jacobians[c].rows();
     const SensorPath* path = search.sensor();
-    const Index counted = path ? path->weighed_samples() - path->bias_terms() : samples;
+    const Index counted = search.counted(residuals[c]).size() - (path ? path->bias_terms() : 0);
     const double freedom = static_cast<double>(counted) - static_cast<double>(free.size()) / channels;
     const double scale = cost == Cost::least_squares
                              ? residuals[c].norm() / std::sqrt(freedom)
-                             : absolute_error_scale(with_weight(search, residuals[c]), static_cast<int>(free.size()));
+                             : absolute_error_scale(search.counted(residuals[c]), static_cast<int>(free.size()));
     const double sd = std::max(1e-200, scale);
     stacked.middleRows(static_cast<Index>(c) * samples, samples) = jacobians[c] / sd;
   }
@@ -74,7 +69,7 @@ void add_uncertainty(OutputErrorSearch& search, const SearchPoint& point, const 
 void add_quality(const OutputErrorSearch& search, const Eigen::VectorXd& residual, const std::vector<double>& measured,
                  const std::vector<double>& sd_m, Fit& fit) {
   fit.fit_percent = fit_percent({residual.begin(), residual.end()}, measured, sd_m);
-  const Eigen::VectorXd counted = with_weight(search, residual);
+  const Eigen::VectorXd counted = search.counted(residual);
   fit.residual_sd = counted.norm() / std::sqrt(static_cast<double>(counted.size()));
 }
 

@@ -14,6 +14,7 @@ namespace {
 constexpr std::array<double, kParameters> kLargestSigma{0.1, 0.5, 0.5, 0.1, 0.1};  // relative but for the orders
 constexpr double kLargestCorrelation = 0.99;
 constexpr double kNearBound = 2e-3;
+constexpr double kNothingPercent = 1;
 constexpr double kDeadTimeAtLimit = 0.99;  // of the longest
 constexpr double kWorthPlanning = 2;       // times better
 constexpr double kPlanDurationS = 60, kPlanBitS = 0.2;
@@ -158,8 +159,12 @@ void add_at_bounds(const Fit& fit, const IdentificationOptions& options, std::ve
   add("beta", fit.model.beta, 0, 1);
 }
 
+bool has_constant_duty(const Recording& recording) {
+  return std::ranges::all_of(recording.duty, [&](double duty) { return duty == recording.duty.front(); });
+}
+
 void add_constant_duty(const Recording& recording, std::vector<std::string>& warnings) {
-  if (!std::ranges::all_of(recording.duty, [&](double duty) { return duty == recording.duty.front(); })) return;
+  if (!has_constant_duty(recording)) return;
   warnings.push_back(base::join_text("the duty is ", recording.duty.front(),
                                      " throughout: a single step shows fast terms ",
                                      "only in its first samples; change the duty during the run"));
@@ -169,6 +174,10 @@ void add_constant_duty(const Recording& recording, std::vector<std::string>& war
 
 bool describes_run(const Fit& fit) {
   return fit.fit_percent >= kPoorFitPercent || (fit.sensor && fit.residuals_are_white);
+}
+
+bool explains_nothing(const Recording& recording, const Fit& fit) {
+  return fit.fit_percent < kNothingPercent && (has_constant_duty(recording) || !describes_run(fit));
 }
 
 std::string structure_name(Structure structure) {

@@ -24,6 +24,8 @@ std::vector<std::string> identifiability_warnings(const Recording& recording, co
 
 // A fit that is poor in percent describes the run nevertheless where only the accelerometer's white noise is left.
 bool describes_run(const Fit& fit);
+// Less than 1 %: of a run with a constant duty, or one that it does not describe, whose noise may hide a small motion.
+bool explains_nothing(const Recording& recording, const Fit& fit);
 
 std::string structure_name(Structure structure);
 std::string end_words(SearchEnd end);  // "reached its time limit"

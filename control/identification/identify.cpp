@@ -12,6 +12,7 @@
 #include "control/identification/residual_doubts.hpp"
 #include "control/identification/second_opinions.hpp"
 #include "control/identification/structure_choice.hpp"
+#include "control/identification/unit_doubts.hpp"
 #include "control/search/output_error_search.hpp"
 
 namespace control {
@@ -48,6 +49,7 @@ Identification identify(const Recording& recording, const IdentificationOptions&
   result.amplitude = amplitude_evidence(search, recording, result.best, points[result.best.structure]);
   std::vector<std::string>& warnings = result.warnings;
   const auto add = [&](std::vector<std::string> more) { std::ranges::move(more, std::back_inserter(warnings)); };
+  add(unit_doubts(recording));
   add(search_doubts(result.best, options));  // causes first, then what follows from them
   add(sensor_doubts(search));
   add(lag_doubts(recording, options, result.best));

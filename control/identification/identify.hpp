@@ -39,7 +39,8 @@
 
 namespace control {
 
-// From columns with times, which must be equally spaced within 1 % of a step.
+// From columns with times, which must be equally spaced within 1 % of a step. A few steps may be missing
+// (missed_ticks.hpp).
 Recording make_recording(std::span<const double> time_s, std::span<const double> duty,
                          std::span<const double> position_m, std::span<const double> velocity_m_s,
                          std::span<const double> acceleration_m_s2 = {});

@@ -13,6 +13,7 @@
 #include "control/identification/residual_doubts.hpp"
 #include "control/identification/second_opinions.hpp"
 #include "control/identification/structure_choice.hpp"
+#include "control/identification/unit_doubts.hpp"
 
 namespace control {
 namespace {
@@ -47,6 +48,7 @@ std::vector<std::string> doubts_of(JointSearch& search, std::size_t i, const Rec
                                    const IdentificationOptions& options, const Fit& fit,
                                    const std::optional<AmplitudeEvidence>& amplitude) {
   std::vector<std::string> warnings;
+  append(warnings, unit_doubts(recording));
   append(warnings, sensor_doubts(search.of_run(i)));
   append(warnings, lag_doubts(recording, options, fit));
   append(warnings, second_opinions(search.of_run(i), recording, options, fit));

@@ -37,7 +37,7 @@ std::vector<Block> blocks(JointSearch& search, Cost cost, Structure structure, c
     const double own = static_cast<double>(std::ssize(columns.of_run[i])) - columns.common;
     const double share = std::max(0.0, own) / channels + columns.common / channels / static_cast<double>(search.runs());
     for (std::size_t c = 0; c < residuals.size(); ++c) {
-      const Eigen::VectorXd counted = path ? path->with_weight(residuals[c]) : residuals[c];
+      const Eigen::VectorXd counted = of_run.counted(residuals[c]);
       const double values = static_cast<double>(counted.size() - (path ? path->bias_terms() : 0));
       const double scale = cost == Cost::least_squares
                                ? residuals[c].norm() / std::sqrt(std::max(1.0, values - share))
@@ -105,16 +105,15 @@ void add_uncertainty(JointSearch& search, Cost cost, const JointResult& found, J
 }
 
 // The values of the run's first channel that count.
-double values_of(OutputErrorSearch& search, const Fit& run) {
-  if (search.sensor()) return static_cast<double>(search.sensor()->weighed_samples());
-  return static_cast<double>(std::max(run.position_residual_m.size(), run.velocity_residual_m_s.size()));
+double values_of(OutputErrorSearch& search, const SearchPoint& point) {
+  return static_cast<double>(search.counted(search.residuals(point).front()).size());
 }
 
-void add_quality(JointSearch& search, JointFit& fit) {
+void add_quality(JointSearch& search, const JointResult& found, JointFit& fit) {
   double values = 0, motion = 0, squares = 0, squared_values = 0, least = 1;
   for (std::size_t i = 0; i < fit.runs.size(); ++i) {
     const Fit& run = fit.runs[i];
-    const double n = values_of(search.of_run(i), run), ratio = 1 - run.fit_percent / 100;
+    const double n = values_of(search.of_run(i), found.points[i]), ratio = 1 - run.fit_percent / 100;
     values += n;
     motion += n / std::max(1e-300, ratio * ratio);
     least = std::min(least, run.whiteness_p_value);
@@ -165,7 +164,7 @@ JointFit joint_summary(JointSearch& search, std::span<const Recording> recording
   }
   fit.all.model = fit.runs.front().model;
   fit.all.model.dead_time_s = dead_time_s(fit.runs);
-  add_quality(search, fit);
+  add_quality(search, found, fit);
   if (found.starts > 0) add_uncertainty(search, cost, found, fit);
   const auto take_end = [&found](Fit& of) {
     of.end = found.end;

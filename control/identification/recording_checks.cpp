@@ -5,6 +5,8 @@
 #include <cmath>
 
 #include "base/invalid_argument.hpp"
+#include "control/search/fit_statistics.hpp"
+#include "control/search/missed_ticks.hpp"
 
 namespace control {
 namespace {
@@ -115,6 +117,9 @@ void check_recording(const Recording& recording) {
                       : "position_m, velocity_m_s and acceleration_m_s2 are all empty: give one of them");
   }
   check_duty(recording.duty);
+  if (!recording.is_missed.empty() && recording.is_missed.size() != samples) {
+    refuse("is_missed has ", recording.is_missed.size(), " values, duty has ", samples, ": give one per sample");
+  }
   if (!recording.position_time_s.empty()) check_own_times(recording);
   if (!recording.position_sd_m.empty()) check_own_sds(recording);
   const std::size_t positions = recording.position_time_s.empty() ? samples : recording.position_time_s.size();
@@ -142,6 +147,43 @@ void check_options(const IdentificationOptions& options, const Recording& record
   }
 }
 
+namespace {
+
+struct Ticks {
+  double dt_s = 0;
+  std::vector<std::size_t> tick;  // of each sample
+};
+
+// The usual step is the middle one, which holes cannot move; every other step is a whole number of it.
+Ticks ticks_of(std::span<const double> time_s) {
+  std::vector<double> steps_s;
+  for (std::size_t k = 1; k < time_s.size(); ++k) steps_s.push_back(time_s[k] - time_s[k - 1]);
+  const double usual_s = median(steps_s);
+  if (!(usual_s > 0)) refuse("time_s must increase, its middle step is ", usual_s);
+  Ticks at{usual_s, {0}};
+  for (std::size_t k = 1; k < time_s.size(); ++k) {
+    const double step_s = steps_s[k - 1], ticks = std::round(step_s / usual_s);
+    if (!(ticks >= 1 && std::abs(step_s - ticks * usual_s) <= kEqualSteps * usual_s)) {
+      refuse("time_s steps by ", step_s, " s to sample ", k, ", and usually by ", usual_s,
+             " s: resample to equal steps, within 1 %; only whole steps may be missing");
+    }
+    if (ticks > kMostMissedInARow + 1) {
+      refuse("time_s steps by ", step_s, " s to sample ", k, ": ", ticks - 1, " steps of ", usual_s,
+             " s are missing, more than ", kMostMissedInARow, " in a row; cut the record there");
+    }
+    at.tick.push_back(at.tick.back() + static_cast<std::size_t>(ticks));
+  }
+  const std::size_t all = at.tick.back() + 1, missed = all - time_s.size();
+  if (!may_be_missed(missed, all)) {
+    refuse("time_s lacks ", missed, " of ", all, " steps, more than ", 100 * kMostMissedShare,
+           " %: cut out a part that has fewer holes");
+  }
+  at.dt_s = (time_s.back() - time_s.front()) / static_cast<double>(at.tick.back());
+  return at;
+}
+
+}  // namespace
+
 Recording make_recording(std::span<const double> time_s, std::span<const double> duty,
                          std::span<const double> position_m, std::span<const double> velocity_m_s,
                          std::span<const double> acceleration_m_s2) {
@@ -150,20 +192,13 @@ Recording make_recording(std::span<const double> time_s, std::span<const double>
   check_column("time_s", time_s, samples);
   if (duty.size() != samples)
     refuse("duty has ", duty.size(), " values, time_s has ", samples, ": give one per sample");
-  const double dt_s = (time_s.back() - time_s.front()) / static_cast<double>(samples - 1);
-  if (!(dt_s > 0)) refuse("time_s must increase, its mean step is ", dt_s);
-  for (std::size_t k = 1; k < samples; ++k) {
-    const double step_s = time_s[k] - time_s[k - 1];
-    if (!(std::abs(step_s - dt_s) <= kEqualSteps * dt_s)) {
-      refuse("time_s steps by ", step_s, " s to sample ", k, " and by ", dt_s,
-             " s in the mean: resample to equal steps, within 1 %");
-    }
-  }
-  Recording recording{dt_s,
+  const Ticks at = ticks_of(time_s);
+  Recording recording{at.dt_s,
                       {duty.begin(), duty.end()},
                       {position_m.begin(), position_m.end()},
                       {velocity_m_s.begin(), velocity_m_s.end()},
                       {acceleration_m_s2.begin(), acceleration_m_s2.end()}};
+  place_at_ticks(recording, at.tick);
   check_recording(recording);
   return recording;
 }

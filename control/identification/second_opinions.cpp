@@ -124,12 +124,13 @@ Eigen::VectorXd response_to_motion(const Stacked& all, double dt_s, double lag_s
 
 struct InitialMotion {
   double velocity_m_s = 0, sigmas = 0, share = 0;
+  Eigen::VectorXd bent = {};  // by how much the slopes' parameters have bent to it, to first order
 };
 
 InitialMotion motion_with_lag(const Stacked& all, const Eigen::ColPivHouseholderQR<Eigen::MatrixXd>& qr, double dt_s,
                               double lag_s) {
   const Eigen::VectorXd motion = response_to_motion(all, dt_s, lag_s);
-  const Eigen::VectorXd own = motion - all.slopes * qr.solve(motion);
+  const Eigen::VectorXd like_motion = qr.solve(motion), own = motion - all.slopes * like_motion;
   const double size = own.squaredNorm();
   if (!(size > 1e-8 * motion.squaredNorm())) return {};
   const double velocity_m_s = own.dot(all.residual) / size;
@@ -141,7 +142,7 @@ InitialMotion motion_with_lag(const Stacked& all, const Eigen::ColPivHouseholder
   }
   const double sd = std::sqrt(rest.squaredNorm() / static_cast<double>(rest.size()) * per_independent_one / size);
   return {velocity_m_s, std::abs(velocity_m_s) / std::max(1e-300, sd),
-          1 - rest.squaredNorm() / all.residual.squaredNorm()};
+          1 - rest.squaredNorm() / all.residual.squaredNorm(), velocity_m_s * like_motion};
 }
 
 // What a flexible model has bent itself to, (1) no longer shows; but its first samples then fit worse than the rest.
@@ -162,6 +163,22 @@ void add_rough_beginning(const Recording& recording, const Fit& fit, std::vector
     warnings.push_back(text.str());
     return;
   }
+}
+
+// "kp by 3 %, b2 by -40 %, alpha by 0.2"
+std::string bent_in_words(const std::vector<int>& free, const Eigen::VectorXd& bent) {
+  std::ostringstream text;
+  text.precision(2);
+  const char* separator = "";
+  for (std::size_t j = 0; j < free.size(); ++j) {
+    const auto parameter = static_cast<std::size_t>(free[j]);
+    if (parameter >= kParameters) continue;
+    const bool is_order = parameter >= 3;
+    const double by = bent[static_cast<Index>(j)];
+    text << std::exchange(separator, ", ") << kParameterNames[parameter] << " by " << (is_order ? by : 100 * by)
+         << (is_order ? "" : " %");
+  }
+  return text.str();
 }
 
 void add_initial_motion(OutputErrorSearch& search, const Recording& recording, const Fit& fit,
@@ -185,7 +202,9 @@ void add_initial_motion(OutputErrorSearch& search, const Recording& recording, c
   std::ostringstream text;
   text.precision(2);
   text << "the run seems to begin in motion, at about " << best.velocity_m_s << " m/s (" << best.sigmas
-       << " sigmas): the model is at rest before the first sample; begin the record at rest";
+       << " sigmas): the model is at rest before the first sample, which costs the fit, to first order, "
+       << bent_in_words(search.free_parameters(fit.structure), scale.cwiseProduct(best.bent))
+       << " (too large by it, if positive); begin the record at rest";
   warnings.push_back(text.str());
 }
 

@@ -28,6 +28,9 @@ struct Recording {
   // record. Empty: position_m has one value per sample.
   std::vector<double> position_time_s = {};
   std::vector<double> position_sd_m = {};  // of each of them; empty: all alike
+  // Ticks at which nothing was measured: the duty holds, other values are filled in and count for nothing
+  // (missed_ticks.hpp). Empty: none.
+  std::vector<bool> is_missed = {};
 };
 
 enum class Cost { least_squares, absolute_error };

@@ -22,7 +22,7 @@ bool is_common(int parameter) { return parameter < static_cast<int>(kParameters)
 
 // Of values that count: readings without weight are 0.
 double rms_of(const OutputErrorSearch& search, const Eigen::VectorXd& residual) {
-  const Index count = search.sensor() ? search.sensor()->weighed_samples() : residual.size();
+  const Index count = search.counted(residual).size();
   return residual.norm() / std::sqrt(static_cast<double>(std::max<Index>(1, count)));
 }
 

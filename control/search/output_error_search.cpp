@@ -29,6 +29,12 @@ constexpr double kEarliestSample = 4, kLatestSample = 2;   // A of sensor_path.h
 constexpr double kLongestTimeConstant = 1;                 // of the sensor, in ticks: more is the fluid
 constexpr double kClockScaleS = 0.01, kLargestClock = 50;  // of a position's clock: half a second at most
 
+Eigen::VectorXd ones_but_at(const std::vector<bool>& missed) {
+  Eigen::VectorXd ones = Eigen::VectorXd::Ones(std::ssize(missed));
+  for (std::size_t k = 0; k < missed.size(); ++k) ones[static_cast<Index>(k)] = missed[k] ? 0 : 1;
+  return ones;
+}
+
 double scale_of(const Eigen::VectorXd& values) { return std::sqrt((values.array() - values.mean()).square().mean()); }
 
 }  // namespace
@@ -56,14 +62,16 @@ OutputErrorSearch::OutputErrorSearch(const Recording& recording, const Identific
   add(Channel::position, recording.position_m);
   add(Channel::velocity, recording.velocity_m_s);
   if (!recording.acceleration_m_s2.empty()) {
-    auto path = std::make_unique<SensorPath>(sensor_readings(recording.acceleration_m_s2), dt_s_);
+    auto path = std::make_unique<SensorPath>(sensor_readings(recording.acceleration_m_s2), dt_s_, recording.is_missed);
     const Eigen::VectorXd readings = path->readings();
     measured_.push_back({Channel::acceleration, OutputModel::with_means(dt_s_, recording.duty, kModelTolerance),
                          readings, scale_of(readings), Eigen::VectorXd::Ones(samples_), std::move(path)});
     sensor_start_.sensor = rough_timing();
     return;
   }
-  if (options.longest_dead_time_s > 0 && recording.position_time_s.empty()) make_scan(recording);
+  if (!recording.position_time_s.empty()) return;
+  if (!recording.is_missed.empty()) counts_ = ones_but_at(recording.is_missed);
+  if (options.longest_dead_time_s > 0) make_scan(recording);
 }
 
 std::vector<int> OutputErrorSearch::free_parameters(Structure structure) const {
@@ -103,7 +111,8 @@ std::vector<Eigen::VectorXd> OutputErrorSearch::residuals(const SearchPoint& poi
     }
     measured.model.set_delay(point.model.dead_time_s, stop_);
     const Eigen::VectorXd output = seen(measured, point, measured.model.output(point.model));
-    result.emplace_back(measured.measured - output - point.offset_m * seen_offset(measured));
+    const Eigen::VectorXd given = counts_.size() > 0 ? counts_.cwiseProduct(measured.measured) : measured.measured;
+    result.emplace_back(given - output - point.offset_m * seen_offset(measured));
   }
   return result;
 }
@@ -142,12 +151,25 @@ double OutputErrorSearch::earliest_sample_s() const { return -options_.longest_d
 Eigen::VectorXd OutputErrorSearch::seen(const Measured& measured, const SearchPoint& point,
                                         const Eigen::VectorXd& output) const {
   if (measured.times) return measured.times->weighed(measured.times->read(output, point.position_clock_s));
-  return measured.path ? measured.path->weighed(measured.path->sampled(output, point.sensor)) : output;
+  if (measured.path) return measured.path->weighed(measured.path->sampled(output, point.sensor));
+  return counts_.size() > 0 ? counts_.cwiseProduct(output) : output;
 }
 
 Eigen::VectorXd OutputErrorSearch::seen_offset(const Measured& measured) const {
   const Eigen::VectorXd offset = Eigen::VectorXd::Constant(rows_, measured.channel == Channel::position ? 1 : 0);
+  if (counts_.size() > 0) return counts_.cwiseProduct(offset);
   return measured.times ? measured.times->weighed(offset) : offset;
+}
+
+Eigen::VectorXd OutputErrorSearch::counted(const Eigen::VectorXd& residual) const {
+  if (sensor()) return sensor()->with_weight(residual);
+  if (counts_.size() == 0) return residual;
+  Eigen::VectorXd kept(static_cast<Index>(counts_.sum()));
+  Index count = 0;
+  for (Index k = 0; k < rows_; ++k) {
+    if (counts_[k] > 0) kept[count++] = residual[k];
+  }
+  return kept;
 }
 
 Eigen::VectorXd OutputErrorSearch::coordinates(Structure structure, const SearchPoint& point) const {
@@ -323,7 +345,8 @@ void OutputErrorSearch::refine_channel_weights(Structure structure, SearchResult
     if (limit_.is_reached()) return;
     for (std::size_t c = 0; c < parts.size(); ++c) {
       const double floor = 1e-13 * scale_of(measured_[c].measured);
-      measured_[c].sd = std::max(floor, parts[c].norm() / std::sqrt(static_cast<double>(rows_)));
+      measured_[c].sd =
+          std::max(floor, counted(parts[c]).norm() / std::sqrt(static_cast<double>(counted(parts[c]).size())));
     }
     result.end = descend(structure, result.point, options_.iteration_limit,
                          {structure, result.starts - 1, result.starts, result.iterations, 0});

@@ -76,7 +76,8 @@ class OutputErrorSearch {
   Eigen::VectorXd coordinates(Structure structure, const SearchPoint& point) const;  // (3)
   SearchPoint point_at(Structure structure, const Eigen::VectorXd& x) const;
   Eigen::VectorXd coordinate_slopes(Structure structure, const SearchPoint& point) const;
-  double spread_of(std::size_t channel) const;  // the sd of all that was measured of it
+  Eigen::VectorXd counted(const Eigen::VectorXd& residual) const;  // only of what was measured and has weight
+  double spread_of(std::size_t channel) const;                     // the sd of all that was measured of it
   std::vector<Channel> channels() const;
   const SearchLimit& limit() const { return limit_; }
   long outputs_computed() const { return outputs_computed_; }  // of one channel each
@@ -126,6 +127,8 @@ class OutputErrorSearch {
   IdentificationOptions options_;
   double dt_s_;
   Eigen::Index samples_;
+  Eigen::VectorXd
+      counts_;         // 1, or 0 at a tick that was missed; empty: every value of a channel without a sensor counts
   Eigen::Index rows_;  // measured values of each channel: samples_, or of a position with times of its own their number
   double offset_scale_m_ = 1;
   bool sensor_is_found_ = false;

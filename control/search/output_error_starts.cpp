@@ -73,7 +73,8 @@ bool OutputErrorSearch::fit_gain(SearchPoint& point) {
     ++outputs_computed_;
     if (!measured.path && !measured.model.set_delay(point.model.dead_time_s, stop_)) return false;
     columns.col(0).segment(c * rows_, rows_) = seen(measured, point, measured.model.output(point.model)) / measured.sd;
-    const Eigen::VectorXd wanted = measured.path ? measured.path->weighed(measured.measured) : measured.measured;
+    Eigen::VectorXd wanted = measured.path ? measured.path->weighed(measured.measured) : measured.measured;
+    if (counts_.size() > 0) wanted = wanted.cwiseProduct(counts_);
     target.segment(c * rows_, rows_) = wanted / measured.sd;
     if (has_offset && c == 0) columns.col(1).head(rows_) = seen_offset(measured) / measured.sd;
   }

@@ -32,13 +32,31 @@ Eigen::MatrixXd knots(Index samples, double duration_s, double knot_s) {
 
 }  // namespace
 
-SensorPath::SensorPath(SensorReadings readings, double dt_s)
+SensorPath::SensorPath(SensorReadings readings, double dt_s, std::vector<bool> is_missed)
     : dt_s_(dt_s),
       reading_m_s2_(Eigen::Map<const Eigen::VectorXd>(readings.reading_m_s2.data(), std::ssize(readings.reading_m_s2))),
       is_repeated_(std::move(readings.is_repeated)),
+      is_missed_(std::move(is_missed)),
       are_recovered_(readings.are_recovered),
       knots_(knots(samples(), dt_s * static_cast<double>(samples() - 1), are_recovered_ ? kKnotS : kKnotOfFilterS)) {
+  bridge_missed();
   set_in_step();
+}
+
+// A straight line from reading to reading, for the search of the clock, which looks at pieces of the record.
+void SensorPath::bridge_missed() {
+  Index last = -1;  // tick that was read
+  for (Index k = 0; k < static_cast<Index>(is_missed_.size()); ++k) {
+    if (is_missed_[static_cast<std::size_t>(k)]) {
+      is_repeated_[static_cast<std::size_t>(k)] = false;
+      continue;
+    }
+    for (Index j = last + 1; last >= 0 && j < k; ++j) {
+      const double share = static_cast<double>(j - last) / static_cast<double>(k - last);
+      reading_m_s2_[j] = reading_m_s2_[last] + share * (reading_m_s2_[k] - reading_m_s2_[last]);
+    }
+    last = k;
+  }
 }
 
 void SensorPath::set_in_step() {
@@ -73,7 +91,12 @@ void SensorPath::leave_out_failed_reads(const Eigen::VectorXd& expected_m_s2, do
   set_weights();
 }
 
-void SensorPath::set_weights() { weighed_knots_.compute(weight_.asDiagonal() * knots_); }
+void SensorPath::set_weights() {
+  for (std::size_t k = 0; k < is_missed_.size(); ++k) {
+    if (is_missed_[k]) weight_[static_cast<Index>(k)] = 0;
+  }
+  weighed_knots_.compute(weight_.asDiagonal() * knots_);
+}
 
 Eigen::VectorXd SensorPath::filtered(const Eigen::VectorXd& motion_m_s2, double time_constant_s) const {
   const auto a = motion_m_s2.head(samples()), mean = motion_m_s2.tail(samples());

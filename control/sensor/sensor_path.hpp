@@ -9,8 +9,8 @@
 // A dead time of whole ticks delays a before (1). P' is P, found apart from it: P and A move (2) smoothly, W and P'
 // change which sample a tick reads, in jumps. A sensor whose samples keep step with the ticks has P = P' = dt. The bias
 // is not a parameter: weighed() takes the best one off. Readings without weight: the same sample read again; one whose
-// sample is uncertain, W being known to `guard_s` only; one that repeats the last although the model moves on by more
-// than 3 sd, which is a failed read.
+// sample is uncertain, W being known to `guard_s` only; one of a tick that was missed; one that repeats the last
+// although the model moves on by more than 3 sd, which is a failed read.
 //
 // A motion is what OutputModel::with_means gives: a at the ticks, and behind it its mean over the tick before each.
 // The means count where a robot begins to move as v ~ t^α: a straight line from tick to tick misses 1 - α/2 of what v
@@ -40,7 +40,8 @@ struct ReadOrder {
 
 class SensorPath {
  public:
-  SensorPath(SensorReadings readings, double dt_s);
+  // is_missed: ticks without a reading; empty: none.
+  SensorPath(SensorReadings readings, double dt_s, std::vector<bool> is_missed = {});
 
   Eigen::Index samples() const { return reading_m_s2_.size(); }
   double dt_s() const { return dt_s_; }
@@ -70,13 +71,14 @@ class SensorPath {
   Eigen::VectorXd bias(const Eigen::VectorXd& residual_m_s2) const;  // the best one, at every tick
 
  private:
+  void bridge_missed();
   void set_weights();
   double place(Eigen::Index tick, const SensorTiming& timing) const;  // of its sample, in ticks
 
   double dt_s_;
   Eigen::Index delay_ticks_ = 0;
   Eigen::VectorXd reading_m_s2_;
-  std::vector<bool> is_repeated_;
+  std::vector<bool> is_repeated_, is_missed_;
   bool are_recovered_;
   bool has_own_clock_ = false;
   ReadOrder order_;

@@ -8,6 +8,7 @@
 #include <ranges>
 #include <utility>
 
+#include "control/search/missed_ticks.hpp"
 #include "control/sensor/position_weight.hpp"
 #include "server/analysis/motion_at_start.hpp"
 
@@ -70,10 +71,10 @@ double usual_step_s(const Piece& piece) {
   return *middle;
 }
 
-// What is wrong between two neighbours, if anything. Stored times are right to 100 us, so equal spacing is asked for
-// within a tenth.
+// What is wrong between two neighbours, if anything. Stored times are right to 100 us, so whole periods are asked for
+// within a tenth of one. A robot that skips a few keeps its duty: they are missed ticks, and no fault.
 std::optional<std::string> gap_between(const Piece& piece, const storage::StoredSample& before,
-                                       const storage::StoredSample& after, double dt_s) {
+                                       const storage::StoredSample& after, double dt_s, double most_skipped) {
   const double at_s = piece.seconds(before), step_s = piece.seconds(after) - at_s;
   if (after.seq != before.seq + 1) {
     return fmt::format("a gap of {:.3f} s at {:.3f} s ({} samples after seq {} are not there)", step_s, at_s,
@@ -81,9 +82,22 @@ std::optional<std::string> gap_between(const Piece& piece, const storage::Stored
   }
   if (std::abs(step_s - dt_s) <= 0.1 * dt_s) return std::nullopt;
   const double skipped = std::round(step_s / dt_s) - 1;
+  if (skipped >= 1 && skipped <= most_skipped && std::abs(step_s - (skipped + 1) * dt_s) <= 0.1 * dt_s) {
+    return std::nullopt;
+  }
   if (!(skipped >= 1)) return fmt::format("a step of {:.4g} s, not {:.4g} s, at {:.3f} s", step_s, dt_s, at_s);
   return fmt::format("the robot skipped {} {} at {:.3f} s; no sample was lost", skipped,
                      skipped == 1 ? "period" : "periods", at_s);
+}
+
+// The tick of each sample.
+std::vector<std::size_t> ticks_of(const Piece& piece, double dt_s) {
+  std::vector<std::size_t> ticks{0};
+  for (std::size_t i = 1; i < piece.samples.size(); ++i) {
+    const double step_s = piece.seconds(piece.samples[i]) - piece.seconds(piece.samples[i - 1]);
+    ticks.push_back(ticks.back() + static_cast<std::size_t>(std::max(1.0, std::round(step_s / dt_s))));
+  }
+  return ticks;
 }
 
 double largest_position_sd_m(const Piece& piece) {
@@ -119,11 +133,11 @@ std::optional<std::string> missing_in(const Piece& piece, const storage::StoredS
 // Cuts the piece where it is not whole.
 class Cut {
  public:
-  Cut(const Piece& piece, const RunWindow& window, double dt_s, Motion motion) {
+  Cut(const Piece& piece, const RunWindow& window, double dt_s, Motion motion, double most_skipped) {
     for (std::size_t i = 0; i < piece.samples.size(); ++i) {
       const storage::StoredSample& stored = piece.samples[i];
       if (i > 0) {
-        if (const auto gap = gap_between(piece, piece.samples[i - 1], stored, dt_s)) end_part(i, i, *gap);
+        if (const auto gap = gap_between(piece, piece.samples[i - 1], stored, dt_s, most_skipped)) end_part(i, i, *gap);
       }
       if (const auto missing = missing_in(piece, stored, window, motion)) end_part(i, i + 1, *missing);
     }
@@ -287,7 +301,13 @@ Result<RunRecording> recording_of(std::span<const storage::StoredSample> samples
   const Motion motion = outside.is_enough() ? Motion::outside
                         : position_sd_m > 0 ? Motion::acceleration
                                             : Motion::position;
-  const Cut cut{*piece, window, dt_s, motion};
+  Cut cut{*piece, window, dt_s, motion, control::kMostMissedInARow};
+  std::vector<std::size_t> ticks;
+  if (cut.is_whole()) {
+    ticks = ticks_of(*piece, dt_s);
+    const std::size_t missed = ticks.back() + 1 - ticks.size();
+    if (!control::may_be_missed(missed, ticks.back() + 1)) cut = Cut{*piece, window, dt_s, motion, 0};
+  }
   if (!cut.is_whole()) {
     const auto part = window.cuts_at_gaps ? cut.longest(*piece, window) : std::nullopt;
     if (!part) return cut.refusal(*piece);
@@ -302,8 +322,7 @@ Result<RunRecording> recording_of(std::span<const storage::StoredSample> samples
   }
   RunRecording made{{}, channels_reason(position_sd_m), {}};
   control::Recording& recording = made.recording;
-  recording.dt_s =
-      (piece->seconds(chosen.back()) - piece->seconds(chosen.front())) / static_cast<double>(chosen.size() - 1);
+  recording.dt_s = (piece->seconds(chosen.back()) - piece->seconds(chosen.front())) / static_cast<double>(ticks.back());
   std::vector<double> recorded_m_s;
   for (const storage::StoredSample& stored : chosen) {
     recorded_m_s.push_back(static_cast<double>(stored.sample.velocity_m_s));
@@ -323,6 +342,10 @@ Result<RunRecording> recording_of(std::span<const storage::StoredSample> samples
     recording.position_sd_m = outside.sd_m;
     made.channels_reason = outside.in_words(*reference);
     made.position_sd_m = control::sd_of_mean_weight(outside.sd_m);
+  }
+  control::place_at_ticks(recording, ticks);
+  if (const std::string missed = control::missed_ticks_in_words(recording); !missed.empty()) {
+    made.warnings.push_back(missed);
   }
   if (const auto warning = driven_before(*piece)) {
     made.warnings.push_back(*warning);

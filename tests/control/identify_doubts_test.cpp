@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <regex>
 
 #include "control/identification/identify.hpp"
 #include "control/search/fit_statistics.hpp"
@@ -80,6 +81,23 @@ TEST(IdentifyDoubts, ARunThatBeginsInMotionIsNamed) {
       EXPECT_THAT(warnings, Not(Contains(HasSubstr("change with amplitude"))));
     }
   }
+}
+
+// Taking the stated cost off brings the parameters most of the way back.
+TEST(IdentifyDoubts, AStartInMotionIsNamedWithWhatItCostsTheParameters) {
+  Recording run = lag_run(1e-5, 801);
+  for (std::size_t k = 0; k < run.duty.size(); ++k) {
+    run.position_m[k] += 0.02 * 0.2 * (1 - std::exp(-0.01 * static_cast<double>(k) / 0.2));
+  }
+  const Identification found = identify(run, one_start(Structure::first_order));
+  const std::regex cost{R"(costs the fit, to first order, kp by (\S+) %, b2 by (\S+) % )"};
+  std::smatch percent;
+  const auto named = std::ranges::find_if(
+      found.warnings, [&](const std::string& warning) { return std::regex_search(warning, percent, cost); });
+  ASSERT_NE(named, found.warnings.end()) << testing::PrintToString(found.warnings);
+  const double off = std::log(found.best.model.b2 / kFirstOrder.b2);
+  EXPECT_GT(std::abs(off), 0.003);
+  EXPECT_LT(std::abs(off - std::stod(percent[2]) / 100), 0.3 * std::abs(off)) << *named;
 }
 
 TEST(IdentifyDoubts, ColourOfEitherChannelCounts) {

@@ -14,6 +14,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "control/search/missed_ticks.hpp"
 #include "server/analysis/control_json.hpp"
 #include "server/analysis/motion_at_start.hpp"
 #include "server/cli/terminal/options.hpp"
@@ -169,12 +170,25 @@ void refuse_gaps(const std::string& file, const analysis::CsvColumns& columns) {
   }
 }
 
+// A missing row is a period that the robot skipped, unless the numbers of the samples tell that some were lost.
+void refuse_lost_samples(const std::string& file, const analysis::CsvColumns& columns) {
+  const auto column = columns.find("seq");
+  if (column == columns.end()) return;
+  const std::vector<double>& seq = column->second;
+  for (std::size_t k = 1; k < seq.size(); ++k) {
+    if (!(seq[k] - seq[k - 1] > 1)) continue;
+    refuse(file, fmt::format("after seq {} follows seq {}: the samples between were lost, and their duty is not known; "
+                             "cut the file there",
+                             seq[k - 1], seq[k]));
+  }
+}
+
 }  // namespace
 
 analysis::RunRecording read_recording(const std::string& file, bool with_velocity) {
   analysis::CsvColumns columns =
       read_csv(file, {"duty"}, {"t_s", "robot_time_us"},
-               {"position_m", "velocity_m_s", kPositionSd, "acceleration_m_s2", "disturbance_m"});
+               {"position_m", "velocity_m_s", kPositionSd, "acceleration_m_s2", "disturbance_m", "seq"});
   const std::vector<double> time_s = times_of(file, columns);
   if (columns.contains(kPositionSd)) round_to_binary32(columns);
   const auto velocity = columns.find("velocity_m_s");
@@ -185,11 +199,15 @@ analysis::RunRecording read_recording(const std::string& file, bool with_velocit
     refuse(file, "has neither position_m nor velocity_m_s; one of them is needed");
   }
   refuse_gaps(file, columns);
+  refuse_lost_samples(file, columns);
   try {
     made.recording = control::make_recording(time_s, columns["duty"], columns["position_m"], columns["velocity_m_s"],
                                              columns["acceleration_m_s2"]);
   } catch (const std::invalid_argument& error) {
     refuse(file, error.what());
+  }
+  if (std::string missed = control::missed_ticks_in_words(made.recording); !missed.empty()) {
+    made.warnings.push_back(std::move(missed));
   }
   if (auto moves = analysis::motion_at_start(made.recording, recorded_m_s)) made.warnings.push_back(std::move(*moves));
   return made;

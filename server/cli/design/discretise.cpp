@@ -6,6 +6,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "control/discretisation/accuracy_doubt.hpp"
 #include "server/analysis/control_json.hpp"
 #include "server/cli/terminal/options.hpp"
 
@@ -14,6 +15,8 @@ namespace {
 
 using control::Discretisation;
 using control::DiscretisationMethod;
+
+using control::CodeLanguage;
 
 const char* yes_no(bool value) { return value ? "yes" : "no"; }
 
@@ -84,13 +87,22 @@ void add_options(CLI::App& command, Sampling& sampling) {
 void add_options(CLI::App& command, Discretise& options) {
   add_option(command, options.controller);
   add_options(command, options.sampling);
+  add_word(command, "--code", options.code, std::array{CodeLanguage::c, CodeLanguage::matlab},
+           "Print the controller as source text instead: c or matlab");
   add_json_flag(command, options.form);
+  command.get_option("--code")->excludes("--json");
   command.footer("Example: rheonaut discretise --period-s 0.01 --order 5 --method direct --a 0.5");
 }
 
 int run(const Discretise& options, std::ostream& out) {
   const control::FopdController controller = read(options.controller);
   const control::DiscretisationChoice choice = discretised(controller, options.sampling);
+  const std::string doubt = control::accuracy_doubt(choice.chosen);
+  if (options.code) {
+    out << control::controller_code(*options.code, controller, choice.chosen);
+    if (!doubt.empty()) fmt::print(stderr, "rheonaut: warning: {}\n", doubt);
+    return 0;
+  }
   if (options.form.is_json) {
     analysis::OrderedJson answer = analysis::json_of(choice.chosen);
     answer["reason"] = choice.reason;
@@ -99,6 +111,7 @@ int run(const Discretise& options, std::ostream& out) {
     answer["refused"] = analysis::OrderedJson::array();
     for (const auto& [name, reason] : choice.refused) answer["refused"].push_back({{"name", name}, {"reason", reason}});
     answer["controller"] = analysis::json_of(controller);
+    answer["warnings"] = doubt.empty() ? std::vector<std::string>{} : std::vector{doubt};
     write_json(out, answer);
     return 0;
   }
@@ -109,6 +122,7 @@ int run(const Discretise& options, std::ostream& out) {
   for (const auto& [name, reason] : choice.refused) fmt::print(out, "refused: the {} {}\n", name, reason);
   out << '\n';
   write_coefficients(out, choice.chosen);
+  if (!doubt.empty()) fmt::print(out, "\nwarning: {}\n", doubt);
   return 0;
 }
 

@@ -1,6 +1,9 @@
 // `rheonaut discretise`: the controller as coefficients that a robot can run.
 #pragma once
 
+#include <optional>
+
+#include "control/discretisation/controller_code.hpp"
 #include "control/discretisation/discretise.hpp"
 #include "server/analysis/tuning/sampling.hpp"
 #include "server/cli/design/control_files.hpp"
@@ -16,6 +19,7 @@ void add_options(CLI::App& command, Sampling& sampling);
 struct Discretise {
   ControllerChoice controller;
   Sampling sampling;
+  std::optional<control::CodeLanguage> code;
   OutputForm form;
 };
 

@@ -15,6 +15,7 @@
 #include <utility>
 #include <vector>
 
+#include "control/identification/identifiability.hpp"
 #include "server/analysis/identification_answer.hpp"
 #include "server/cli/terminal/exit_status.hpp"
 #include "server/cli/terminal/options.hpp"
@@ -266,7 +267,8 @@ void add_options(CLI::App& command, Identify& options) {
     command.get_option("--plan")->excludes(searching);
   }
   command.footer(
-      "Exit status 4: the search did not converge; the best that was found is printed.\n"
+      "Exit status 4: the search did not converge, or the model explains nothing of the run; what was found is "
+      "printed.\n"
       "Example: rheonaut identify --csv run.csv --structure fractional");
 }
 
@@ -286,6 +288,13 @@ int run(const Identify& options, std::ostream& out) {
   if (!std::isfinite(found.best.sse)) {
     fmt::print(stderr,
                "rheonaut: no model fits this recording with finite numbers; are its units and columns right?\n");
+    return kNotConverged;
+  }
+  if (control::explains_nothing(runs.front().recorded.recording, found.best)) {
+    fmt::print(stderr,
+               "rheonaut: the model explains {} % of the run, so its parameters say nothing; record a run in which the "
+               "duty changes and the robot moves\n",
+               fixed(found.best.fit_percent, 1));
     return kNotConverged;
   }
   return found.best.end == control::SearchEnd::converged ? 0 : kNotConverged;

@@ -60,6 +60,18 @@ TEST_F(Discretising, ListsWhatItRefused) {
   EXPECT_THAT(ask("discretise --period-s 0.001 --order 1").text, HasSubstr("refused: the direct method"));
 }
 
+TEST_F(Discretising, PrintsTheControllerAsSourceText) {
+  EXPECT_THAT(ask("discretise --code c").text, HasSubstr("double rheonaut_controller_step("));
+  EXPECT_THAT(ask("discretise --code matlab").text, testing::StartsWith("function [duty, state] = "));
+  EXPECT_EQ(ask("discretise --code c --json").exit_code, 2);
+}
+
+TEST_F(Discretising, SaysWhenTheCoefficientsAreNotTheControllerAnyMore) {
+  EXPECT_TRUE(ask("discretise --json").json()["warnings"].empty());
+  EXPECT_THAT(ask("discretise --period-s 0.1 --method direct").text, HasSubstr("warning: below 25.1 rad/s"));
+  EXPECT_EQ(ask("discretise --period-s 0.1 --method direct --json").json()["warnings"].size(), 1u);
+}
+
 class Predicting : public ToolTest {};
 
 TEST_F(Predicting, GivesTheReferenceMetrics) {
@@ -190,6 +202,16 @@ TEST_F(Identifying, APlanPredictsTheUncertaintyOfAnExperiment) {
   EXPECT_NEAR(prbs["one_sigma"]["alpha"], 0.021, 0.006);
   EXPECT_THAT(ask("identify --plan --plan-duty step --plan-amplitude 0.3").text, HasSubstr("relative (%)"));
   EXPECT_EQ(ask("identify --plan --plan-dt-s 1e-9").exit_code, 2);
+}
+
+// A robot that does not move, with a sensor that trembles.
+TEST_F(Identifying, ARunThatTheModelDoesNotExplainEndsWithStatus4) {
+  std::string csv = "t_s,duty,velocity_m_s\n";
+  for (int k = 0; k < 200; ++k) csv += fmt::format("{},0.3,{}\n", 0.01 * k, 1e-3 * ((k * 7919) % 101 - 50));
+  save("still.csv", csv);
+  const Answer answer = ask("identify --csv @still.csv --structure first_order");
+  EXPECT_EQ(answer.exit_code, 4);
+  EXPECT_THAT(answer.error, HasSubstr("of the run, so its parameters say nothing"));
 }
 
 }  // namespace

@@ -203,28 +203,38 @@ TEST_F(RunTools, IdentifyRefusesAGapAndSaysWhereItIs) {
   EXPECT_NE(ask("identify --run 1 --to-s 0.99 --structure first_order").exit_code, 1);
 }
 
+TEST_F(RunTools, IdentifyTakesPeriodsThatTheRobotSkippedAsTicksWithoutAValue) {
+  begin();
+  swim(100, 0.3);
+  robot_.late_us = 50'000;
+  swim(300, 0.3);
+  flush();
+  const ToolAnswer answer = ask("identify --run 1 --structure first_order");
+  EXPECT_NE(answer.exit_code, 1) << answer.error;
+  EXPECT_THAT(answer.error, HasSubstr("5 of 405 ticks are missing, the first at 1 s"));
+}
+
 TEST_F(RunTools, IdentifyDistinguishesARobotThatRanLateFromLostSamples) {
   begin();
   swim(100, 0.3);
-  robot_.late_us = 60'000;
+  robot_.late_us = 300'000;
   swim(50, 0.3);
-  robot_.late_us = 80'000;
+  robot_.late_us = 320'000;
   swim(200, 0.3);
   flush();
   const ToolAnswer answer = ask("identify --run 1");
   EXPECT_EQ(answer.exit_code, 1);
-  EXPECT_THAT(answer.error, AllOf(HasSubstr("the robot skipped 6 periods at 0.990 s; no sample was lost"),
-                                  HasSubstr("the robot skipped 2 periods at 1.550 s; no sample was lost"),
-                                  HasSubstr("choose --from-s 1.58 --to-s 3.57, or --from-s 0 --to-s 0.99"),
+  EXPECT_THAT(answer.error, AllOf(HasSubstr("the robot skipped 30 periods at 0.990 s; no sample was lost"),
+                                  HasSubstr("choose --from-s 1.3 --to-s 3.81, or --from-s 0 --to-s 0.99"),
                                   Not(HasSubstr("not there"))));
-  EXPECT_NE(ask("identify --run 1 --from-s 1.58 --to-s 3.57 --structure first_order").exit_code, 1);
+  EXPECT_NE(ask("identify --run 1 --from-s 1.3 --to-s 3.81 --structure first_order").exit_code, 1);
 }
 
 // The longer part begins under way, where the model is not at rest.
 TEST_F(RunTools, CutAtGapsTakesTheLongestPartThatBeginsAtRest) {
   begin();
   swim(100, 0.3);
-  robot_.late_us = 60'000;
+  robot_.late_us = 600'000;
   swim(200, 0.3);
   flush();
   const ToolAnswer answer = ask("identify --run 1 --cut-at-gaps --structure first_order");
@@ -236,12 +246,12 @@ TEST_F(RunTools, CutAtGapsTakesALaterPartAfterARest) {
   begin();
   swim(50, 0.3);
   swim(550, 0);
-  robot_.late_us = 60'000;
+  robot_.late_us = 600'000;
   swim(700, -0.3);
   flush();
   const ToolAnswer answer = ask("identify --run 1 --cut-at-gaps --structure first_order");
   EXPECT_NE(answer.exit_code, 1) << answer.error;
-  EXPECT_THAT(answer.error, HasSubstr("from 6.060 to"));
+  EXPECT_THAT(answer.error, HasSubstr("from 6.600 to"));
 }
 
 TEST_F(RunTools, IdentifyWarnsOfAWindowThatBeginsInMotion) {

@@ -1,0 +1,57 @@
+// Holds the duty, draws lines through positions and velocities, and marks what was not measured.
+#include "control/search/missed_ticks.hpp"
+
+#include <algorithm>
+#include <vector>
+
+#include "base/invalid_argument.hpp"
+
+namespace control {
+namespace {
+
+enum class Fill { hold, line };
+
+std::vector<double> filled(const std::vector<double>& values, std::span<const std::size_t> ticks, Fill fill) {
+  std::vector<double> all;
+  if (values.empty()) return all;
+  all.reserve(ticks.back() + 1);
+  for (std::size_t k = 0; k + 1 < values.size(); ++k) {
+    const std::size_t steps = ticks[k + 1] - ticks[k];
+    const double slope = fill == Fill::line ? (values[k + 1] - values[k]) / static_cast<double>(steps) : 0;
+    for (std::size_t i = 0; i < steps; ++i) all.push_back(values[k] + slope * static_cast<double>(i));
+  }
+  all.push_back(values.back());
+  return all;
+}
+
+}  // namespace
+
+bool may_be_missed(std::size_t missed, std::size_t ticks) {
+  return static_cast<double>(missed) <= kMostMissedShare * static_cast<double>(ticks);
+}
+
+void place_at_ticks(Recording& recording, std::span<const std::size_t> ticks) {
+  if (ticks.empty() || ticks.back() + 1 == ticks.size()) return;
+  recording.duty = filled(recording.duty, ticks, Fill::hold);
+  recording.velocity_m_s = filled(recording.velocity_m_s, ticks, Fill::line);
+  recording.acceleration_m_s2 = filled(recording.acceleration_m_s2, ticks, Fill::hold);
+  if (recording.position_time_s.empty()) recording.position_m = filled(recording.position_m, ticks, Fill::line);
+  recording.is_missed.assign(recording.duty.size(), true);
+  for (const std::size_t tick : ticks) recording.is_missed[tick] = false;
+}
+
+std::size_t missed_ticks(const Recording& recording) {
+  return static_cast<std::size_t>(std::ranges::count(recording.is_missed, true));
+}
+
+std::string missed_ticks_in_words(const Recording& recording) {
+  const std::size_t missed = missed_ticks(recording), ticks = recording.is_missed.size();
+  if (missed == 0) return {};
+  const auto first = std::ranges::find(recording.is_missed, true) - recording.is_missed.begin();
+  return base::join_text(missed, " of ", ticks, " ticks are missing, the first at ",
+                         recording.dt_s * static_cast<double>(first),
+                         " s: they count for nothing, and the duty before each is taken to hold through it, as a robot "
+                         "that skips a period keeps it");
+}
+
+}  // namespace control

@@ -1,0 +1,139 @@
+// A tick that a robot missed costs the fit that tick, and nothing else: the duty holds through it.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+
+#include "control/search/missed_ticks.hpp"
+#include "control/sensor/sensor_path.hpp"
+#include "recorded_runs.hpp"
+
+namespace control {
+namespace {
+
+using testing::HasSubstr;
+
+constexpr double kDtS = 0.01;
+const FractionalModel kFluid{0.1, 0.006, 0.11, 1, 2, 1};
+
+IdentificationOptions one_start() {
+  IdentificationOptions options = unhurried_options();
+  options.structure = Structure::second_order;
+  options.further_starts = 0;
+  return options;
+}
+
+// Ticks 0 to last but for a share of them, and five in a row; the robot could not change its duty at those.
+std::vector<std::size_t> most_ticks(std::size_t ticks, double missed_share, unsigned seed) {
+  std::mt19937 random{seed};
+  std::bernoulli_distribution misses{missed_share};
+  std::vector<std::size_t> made;
+  for (std::size_t k = 0; k < ticks; ++k) {
+    const bool in_hole = k >= ticks / 3 && k < ticks / 3 + 5;
+    const bool is_missed = k > 0 && k + 1 < ticks && (in_hole || misses(random));
+    if (!is_missed) made.push_back(k);
+  }
+  return made;
+}
+
+std::vector<double> held(std::vector<double> duty, const std::vector<std::size_t>& ticks) {
+  for (std::size_t i = 1, k = 1; k < duty.size(); ++k) {
+    if (ticks[i] == k) {
+      ++i;
+    } else {
+      duty[k] = duty[k - 1];
+    }
+  }
+  return duty;
+}
+
+std::vector<double> at(const std::vector<double>& values, const std::vector<std::size_t>& ticks) {
+  std::vector<double> some;
+  for (const std::size_t tick : ticks) {
+    if (!values.empty()) some.push_back(values[tick]);
+  }
+  return some;
+}
+
+Recording sampled_at(const Recording& whole, const std::vector<std::size_t>& ticks) {
+  std::vector<double> time_s;
+  for (const std::size_t tick : ticks) time_s.push_back(kDtS * static_cast<double>(tick));
+  return make_recording(time_s, at(whole.duty, ticks), at(whole.position_m, ticks), at(whole.velocity_m_s, ticks),
+                        at(whole.acceleration_m_s2, ticks));
+}
+
+void expect_within_sigmas(const Fit& fit, double sigmas) {
+  EXPECT_LT(std::abs(fit.model.kp - kFluid.kp), sigmas * *fit.one_sigma[0]);
+  EXPECT_LT(std::abs(fit.model.b1 - kFluid.b1), sigmas * *fit.one_sigma[1]);
+  EXPECT_LT(std::abs(fit.model.b2 - kFluid.b2), sigmas * *fit.one_sigma[2]);
+}
+
+TEST(MissedTicks, OnePercentCostsAPositionFitNothingButThoseValues) {
+  const auto ticks = most_ticks(2001, 0.01, 3);
+  const Recording whole = position_run(kFluid, held(prbs_duty(0.6, 0.2, 20, kDtS), ticks), 1e-4, 5);
+  const Recording run = sampled_at(whole, ticks);
+  ASSERT_GT(missed_ticks(run), 15U);
+  EXPECT_EQ(run.duty, whole.duty);
+  const Fit fit = identify(run, one_start()).best, all = identify(whole, one_start()).best;
+  expect_within_sigmas(fit, 3);
+  EXPECT_NEAR(*fit.one_sigma[1] / *all.one_sigma[1], 1, 0.05);
+  EXPECT_NEAR(fit.residual_sd / 1e-4, 1, 0.05);
+  EXPECT_TRUE(fit.residuals_are_white);
+}
+
+TEST(MissedTicks, WhatIsFilledInCountsForNothing) {
+  const auto ticks = most_ticks(1001, 0.03, 4);
+  Recording run = sampled_at(position_run(kFluid, held(prbs_duty(0.6, 0.2, 10, kDtS), ticks), 1e-4, 5), ticks);
+  const Fit before = identify(run, one_start()).best;
+  for (std::size_t k = 0; k < run.duty.size(); ++k) {
+    if (run.is_missed[k]) run.position_m[k] += 0.001;
+  }
+  const Fit after = identify(run, one_start()).best;
+  EXPECT_NEAR(after.model.b1 / before.model.b1, 1, 1e-6);
+  EXPECT_NEAR(after.model.kp / before.model.kp, 1, 1e-6);
+}
+
+TEST(MissedTicks, OfAnAccelerometerToo) {
+  const auto ticks = most_ticks(1501, 0.01, 6);
+  Recording whole{kDtS, held(prbs_duty(0.6, 0.2, 15, kDtS), ticks), {}, {}};
+  const Eigen::VectorXd felt_m_s2 = OutputModel::with_means(kDtS, whole.duty, 1e-9).output(kFluid);
+  const SensorPath path({std::vector<double>(whole.duty.size()), std::vector<bool>(whole.duty.size()), false}, kDtS);
+  const Eigen::VectorXd readings = path.sampled(felt_m_s2, {-0.75 * kDtS, kDtS, 0.25 * kDtS});
+  whole.acceleration_m_s2.assign(readings.begin(), readings.end());
+  add_noise(whole.acceleration_m_s2, 0.01, 5);
+  for (double& reading : whole.acceleration_m_s2) reading = 0.01 * std::round(reading / 0.01);
+  const Recording run = sampled_at(whole, ticks);
+  const Fit fit = identify(run, one_start()).best, all = identify(whole, one_start()).best;
+  ASSERT_TRUE(fit.sensor);
+  EXPECT_TRUE(fit.sensor->readings_are_recovered);
+  EXPECT_GE(fit.sensor->readings_left_out, missed_ticks(run));
+  expect_within_sigmas(fit, 3);
+  EXPECT_NEAR(*fit.one_sigma[1] / *all.one_sigma[1], 1, 0.1);
+}
+
+TEST(MissedTicks, AreNamedWithHowManyAndWhere) {
+  const auto ticks = most_ticks(1001, 0, 4);
+  const Recording run = sampled_at(position_run(kFluid, held(prbs_duty(0.6, 0.2, 10, kDtS), ticks), 1e-4, 5), ticks);
+  EXPECT_THAT(missed_ticks_in_words(run), HasSubstr("5 of 1001 ticks are missing, the first at 3.33 s"));
+}
+
+TEST(MissedTicks, TooManyAreRefusedWithTheNumbers) {
+  const Recording whole = position_run(kFluid, prbs_duty(0.6, 0.2, 10, kDtS), 1e-4, 5);
+  const auto refusal = [&](const std::vector<std::size_t>& ticks) {
+    try {
+      sampled_at(whole, ticks);
+    } catch (const std::invalid_argument& error) {
+      return std::string{error.what()};
+    }
+    return std::string{"not refused"};
+  };
+  EXPECT_THAT(refusal(most_ticks(1001, 0.08, 2)), HasSubstr("more than 5 %: cut out a part that has fewer holes"));
+  std::vector<std::size_t> hole = most_ticks(1001, 0, 2);
+  std::erase_if(hole, [](std::size_t tick) { return tick >= 500 && tick < 530; });
+  EXPECT_THAT(refusal(hole), HasSubstr("30 steps of 0.01 s are missing, more than 25 in a row"));
+}
+
+}  // namespace
+}  // namespace control
