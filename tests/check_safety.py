@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Checks that docs/safety.md agrees with the code: each row of its tables names a guard, a test and a bound that are there.
 
-A guard is a mark `SAFETY:` in robot_fw/, server/ or protocol/. The page quotes it as `path`: "the words that follow the
+A guard is a mark `SAFETY:` in robot_fw/, server/ or protocol/ (those of the page, in web/src, are not compared). The page quotes it as `path`: "the words that follow the
 mark in its line", and lists each mark once, in a table of failures or in the table of the other guards. A test is
 `Suite.Name` (GoogleTest), `tests/system/x_test.py test_y` or `web/tests/x.ts "title"`; its file must be one that is
 built and run. Prints `docs/safety.md: what is wrong` and fails if anything is.
@@ -31,12 +31,20 @@ def marks(root):
     return found
 
 
+def is_listed(name, cmake):
+    """Whether a CMakeLists.txt names it, as a whole word that is not in a comment."""
+    if not cmake.is_file():
+        return False
+    code = re.sub(r"#.*", "", cmake.read_text(encoding="utf-8"))
+    return re.search(rf"(?<![\w.]){re.escape(name)}(?![\w.])", code) is not None
+
+
 def googletests(root):
     """Names of the tests whose file stands in a CMakeLists.txt of its folder, or of one above it."""
     names = set()
     for path in (root / "tests").rglob("*_test.cpp"):
         lists = (folder / "CMakeLists.txt" for folder in path.parents if folder.is_relative_to(root / "tests"))
-        if any(path.name in known.read_text(encoding="utf-8") for known in lists if known.is_file()):
+        if any(is_listed(path.name, known) for known in lists):
             text = path.read_text(encoding="utf-8")
             names |= {f"{suite}.{name}" for suite, name in re.findall(r"^TEST(?:_F|_P)?\((\w+),\s*(\w+)\)", text, re.M)}
     return names
@@ -57,7 +65,7 @@ def missing_test(root, known, cell):
         return None if name in known else f"no test {name}"
     file, listed = root / path, (root / path).parent / "CMakeLists.txt"
     there = file.is_file() and re.search(rf"^    def {re.escape(function)}\(", file.read_text(encoding="utf-8"), re.M)
-    run = listed.is_file() and re.search(rf"\b{re.escape(file.name.removesuffix('_test.py'))}\b", listed.read_text(encoding="utf-8"))
+    run = is_listed(file.name.removesuffix("_test.py"), listed)
     return None if there and run else f"no test {name}"
 
 
@@ -66,6 +74,9 @@ def faults(root):
     known = googletests(root)
     hazards = re.search(r"^## Hazards$.*?(?=^## |\Z)", text, re.M | re.S).group(0)
     rows = set()
+    for line in text.splitlines():
+        if re.match(r"\| *\d+\.\d+ *\|", line) and not ROW.fullmatch(line):
+            yield f"a row is not written as one: {line[:60]}"
     for number, rest in ROW.findall(hazards):
         cells = [cell.strip() for cell in rest.split(" | ")]
         if len(cells) != COLUMNS:

@@ -38,7 +38,7 @@ inline std::string close_frame(const Closing& closing) {
   return frame.append(closing.reason);
 }
 
-// Not into the middle of a message that is being written.
+// Not into the middle of a message that is being written, nor behind one that was cut off.
 inline void write_close_frame(http::HttpStream& stream, const PeerWatch& peer, const Closing& closing) {
   if (!peer.is_writing()) stream.write_now(close_frame(closing));
 }

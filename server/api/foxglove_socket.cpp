@@ -121,7 +121,7 @@ class FoxgloveClient {
     socket_.binary(outgoing.head.has_value());
     peer_.on_write_begun();
     const auto [error, size] = co_await socket_.async_write(pieces, asio::as_tuple(asio::use_awaitable));
-    peer_.on_written();
+    if (!error) peer_.on_written();
     co_return error;
   }
 
@@ -140,7 +140,7 @@ class FoxgloveClient {
       const websocket::ping_data empty;
       peer_.on_write_begun();
       const auto [error] = co_await socket_.async_ping(empty, asio::as_tuple(asio::use_awaitable));
-      peer_.on_written();
+      if (!error) peer_.on_written();
       if (error) co_return leave(error);
     }
   }

@@ -128,7 +128,7 @@ class LivePage {
       peer_.on_write_begun();
       const auto [error, size] = co_await socket_.async_write_some(welcome.is_whole(), asio::buffer(piece),
                                                                    asio::as_tuple(asio::use_awaitable));
-      peer_.on_written();
+      if (!error) peer_.on_written();
       if (error) co_return error;
     }
     co_return boost::system::error_code{};
@@ -144,14 +144,14 @@ class LivePage {
         peer_.on_write_begun();
         const auto [error, size] =
             co_await socket_.async_write(asio::buffer(*message), asio::as_tuple(asio::use_awaitable));
-        peer_.on_written();
+        if (!error) peer_.on_written();
         if (error) co_return leave(error);
       }
       if (!peer_.take_ping()) continue;
       const websocket::ping_data empty;
       peer_.on_write_begun();
       const auto [error] = co_await socket_.async_ping(empty, asio::as_tuple(asio::use_awaitable));
-      peer_.on_written();
+      if (!error) peer_.on_written();
       if (error) co_return leave(error);
     }
   }

@@ -140,12 +140,13 @@ asio::awaitable<Next> HttpConnection::read_and_answer() {
   co_return next;
 }
 
-// Gives the parser what has arrived, until the head is whole (no error) or refused. It takes nothing of a part of a
-// head.
+// Gives the parser what has arrived, until the head is whole (no error) or refused. Of a part of a head it takes whole
+// fields only, when it has seen that the next line does not continue them.
 void HttpConnection::take_head(RequestParser& parser, boost::system::error_code& error) {
   const std::size_t size = parser.put(buffer_.data(), error);
   const std::string_view head{static_cast<const char*>(buffer_.data().data()), size};
-  if (!error && has_folded_line(head)) error = http::error::bad_obs_fold;
+  const bool is_read_so_far = !error || error == http::error::need_more;
+  if (is_read_so_far && has_folded_line(head)) error = http::error::bad_obs_fold;
   if (!error && has_unknown_length(parser)) error = http::error::bad_transfer_encoding;
   buffer_.consume(size);
 }

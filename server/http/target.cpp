@@ -77,7 +77,8 @@ std::optional<std::string> percent_decode(std::string_view text, bool plus_is_sp
 Target::Target(std::string text) : text_{std::move(text)} {
   if (auto absolute = absolute_form(text_)) std::tie(authority_, text_) = std::move(*absolute);
   path_size_ = std::min(text_.find('?'), text_.size());
-  segments_ = path_segments(std::string_view{text_}.substr(0, path_size_));
+  if (authority_.find('@') == std::string::npos)  // what looks like the host may be a user's name there
+    segments_ = path_segments(std::string_view{text_}.substr(0, path_size_));
   for (const std::string& segment : segments_) path_ += "/" + segment;
 }
 

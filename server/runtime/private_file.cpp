@@ -84,12 +84,21 @@ std::optional<std::string> read_private(const fs::path& file) {
   if (opened.number < 0 && errno == ELOOP)
     throw std::runtime_error{
         fmt::format("'{0}' is a link, which could lead to a file of somebody else; type: rm '{0}'", file.string())};
+  if (opened.number < 0 && errno == EACCES)
+    throw std::runtime_error{
+        fmt::format("'{0}' may not be read by {1}; type: sudo chown {1} '{0}'", file.string(), name_of(::geteuid()))};
   if (opened.number < 0) cannot("read", file);
   struct stat status{};
   if (::fstat(opened.number, &status) != 0) cannot("look at", file);
   if (!S_ISREG(status.st_mode)) throw std::runtime_error{fmt::format("'{}' is no file", file.string())};
   require_own("the file", file, status);  // SAFETY: of what was opened, not of what the name may mean by now
-  if ((status.st_mode & 077U) != 0) {
+  if ((status.st_mode & S_IWGRP) != 0) {
+    throw std::runtime_error{
+        fmt::format("the group of '{0}' may write to it (mode {1:04o}), so one of them could have put a token there; "
+                    "type: rm '{0}'",
+                    file.string(), status.st_mode & 07777U)};
+  }
+  if ((status.st_mode & 077U) != 0 && status.st_uid == ::geteuid()) {
     spdlog::warn("{} was readable by others (mode {:o}); now it is not", file.string(), status.st_mode & 0777U);
     if (::fchmod(opened.number, 0600) != 0) cannot("protect", file);
   }

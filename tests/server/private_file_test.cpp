@@ -57,6 +57,20 @@ TEST_F(PrivateFile, ThatAllMayWriteIsRefusedWithTheLineToType) {
   EXPECT_NE(said.find("chmod o-w '" + token.string() + "'"), std::string::npos) << said;
 }
 
+TEST_F(PrivateFile, ThatItsGroupMayWriteIsRefusedWithTheLineToType) {
+  const fs::path token = file("secret", 0660);
+  const std::string said = refusal([&] { runtime::read_private(token); });
+  EXPECT_NE(said.find("rm '" + token.string() + "'"), std::string::npos) << said;
+}
+
+TEST_F(PrivateFile, ThatOthersMayReadIsProtectedWithAWarning) {
+  const fs::path token = file("secret", 0644);
+  const CapturedLog log;
+  EXPECT_EQ(runtime::read_private(token), "secret");
+  EXPECT_TRUE(log.has("was readable by others")) << log.text();
+  EXPECT_EQ(fs::status(token).permissions(), fs::perms::owner_read | fs::perms::owner_write);
+}
+
 TEST_F(PrivateFile, ThatIsALinkIsRefused) {
   const fs::path link = folder / "link";
   fs::create_symlink(file("secret"), link);

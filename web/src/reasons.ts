@@ -10,7 +10,7 @@ export const kReasons: Record<string, string> = {
   wrong_mode: 'Not possible in this mode.',
   latched: 'The emergency stop is latched. Clear it first.',
   other_emergency: 'Another emergency is in force than the one you meant to clear. Look again.',
-  cause_stands: 'The cause of the emergency still stands.',
+  cause_stands: 'The cause of the emergency still stands, or the motor’s supply is cut.',
   life_too_long: 'The command would have lived too long.',
   nothing_to_renew: 'The duty had ended already.',
   motor_on: 'Not while the motor runs.',

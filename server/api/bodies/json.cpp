@@ -81,12 +81,9 @@ Result<Members> Members::parse(const std::string& text, std::initializer_list<co
     return fail(ErrorCode::bad_request, "the body is not valid JSON (JSON has no NaN and no Infinity)",
                 "malformed_json");
   }
-  if (!repeated.first().empty()) {
-    return fail(ErrorCode::bad_request, fmt::format("{} is given twice in one object", repeated.first()),
-                "repeated_member");
-  }
   if (!value.is_object()) return fail(ErrorCode::bad_request, "the body is not a JSON object", "malformed_json");
   Members members{std::move(value)};
+  members.repeated_ = repeated.first();
   if (known.size() > 0) {
     if (auto checked = members.only(known); !checked) return std::unexpected{checked.error()};
   }
@@ -94,6 +91,9 @@ Result<Members> Members::parse(const std::string& text, std::initializer_list<co
 }
 
 Result<void> Members::only(std::initializer_list<const char*> known) const {
+  if (!repeated_.empty()) {
+    return fail(ErrorCode::bad_request, fmt::format("{} is given twice in one object", repeated_), "repeated_member");
+  }
   for (const auto& [name, value] : object_.items()) {
     const auto same = [&name](const char* other) { return name == other; };
     if (std::ranges::none_of(known, same)) {

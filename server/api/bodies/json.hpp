@@ -41,6 +41,7 @@ class Members {
   static Result<Members> parse(const std::string& text, std::initializer_list<const char*> known);
   explicit Members(nlohmann::json object) : object_{std::move(object)} {}
 
+  // Errors when there is another member, or one of the object is given twice (in any depth): the last of them counts.
   Result<void> only(std::initializer_list<const char*> known) const;
   bool has(const char* name) const { return object_.contains(name); }
 
@@ -60,6 +61,7 @@ class Members {
 
  private:
   nlohmann::json object_;
+  std::string repeated_;  // a member that is given twice in one object, quoted; empty: there is none
 };
 
 struct ParsedCommand {

@@ -45,13 +45,17 @@ TEST_F(HttpHeadTest, AHeadInPiecesIsReadAsOne) {
     }
     EXPECT_TRUE(client.read_to_end().starts_with("HTTP/1.1 200 ")) << piece;
   }
-  RawClient client{clock, api->port()};
-  const std::string folded = head("GET /api/v1/robots", "X-Note: a\r\n b\r\n");
-  for (const char c : folded) {
-    client.send(std::string{c});
+}
+
+TEST_F(HttpHeadTest, AFoldedLineIsRefusedWhereverTheHeadIsCut) {
+  const std::string folded = head("GET /api/v1/robots", "X-Note: a\r\n Content-Length: 3\r\n");
+  for (std::size_t cut = 1; cut < folded.size(); ++cut) {
+    RawClient client{clock, api->port()};
+    client.send(folded.substr(0, cut));
     clock.settle();
+    client.send(folded.substr(cut));
+    EXPECT_TRUE(client.read_to_end().starts_with("HTTP/1.1 400 ")) << cut;
   }
-  EXPECT_TRUE(client.read_to_end().starts_with("HTTP/1.1 400 "));
 }
 
 TEST_F(HttpHeadTest, TheHostOfATargetInTheAbsoluteFormStandsForTheHeader) {

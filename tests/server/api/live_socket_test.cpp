@@ -82,6 +82,10 @@ TEST_F(LiveSocketTest, AStopIsObeyedWhateverElseTheMessageSays) {
     page->say(stop);
     EXPECT_EQ(commands(rheonaut_Command_emergency_stop_tag).size(), ++stops) << stop;
   }
+  page->say_text(R"({"type":"emergency_stop","key":"a","key":"b","robot_id":"r1","robot_id":"r1"})");
+  EXPECT_EQ(commands(rheonaut_Command_emergency_stop_tag).size(), ++stops);
+  page->say_text(R"({"type":"keep_alive","stamp_us":1,"stamp_us":2})");
+  EXPECT_EQ(page->receive("problem")["problem"]["reason"], "repeated_member");
 }
 
 TEST_F(LiveSocketTest, AStopIsObeyedFromAPageThatDoesNotRead) {
