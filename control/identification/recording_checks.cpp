@@ -167,9 +167,9 @@ Ticks ticks_of(std::span<const double> time_s) {
       refuse("time_s steps by ", step_s, " s to sample ", k, ", and usually by ", usual_s,
              " s: resample to equal steps, within 1 %; only whole steps may be missing");
     }
-    if (ticks > kMostMissedInARow + 1) {
+    if (ticks - 1 > static_cast<double>(most_missed_in_a_row(usual_s))) {
       refuse("time_s steps by ", step_s, " s to sample ", k, ": ", ticks - 1, " steps of ", usual_s,
-             " s are missing, more than ", kMostMissedInARow, " in a row; cut the record there");
+             " s are missing, more than ", kLongestMissedS, " s in a row; cut the record there");
     }
     at.tick.push_back(at.tick.back() + static_cast<std::size_t>(ticks));
   }
