@@ -113,6 +113,24 @@ TEST(MissedTicks, TheLongestHoleIsATime) {
   EXPECT_EQ(most_missed_in_a_row(1), 0U);
 }
 
+TEST(MissedTicks, ColumnsOfAnotherLengthAreRefusedBeforeTheyArePlaced) {
+  const auto ticks = most_ticks(101, 0, 4);
+  std::vector<double> time_s;
+  for (const std::size_t tick : ticks) time_s.push_back(kDtS * static_cast<double>(tick));
+  const std::vector<double> duty(time_s.size(), 0.5), longer(time_s.size() + 50, 0.1), shorter(time_s.size() - 1, 0.1);
+  const auto refusal = [&](const std::vector<double>& position_m, const std::vector<double>& velocity_m_s) {
+    try {
+      make_recording(time_s, duty, position_m, velocity_m_s);
+    } catch (const std::invalid_argument& error) {
+      return std::string{error.what()};
+    }
+    return std::string{"not refused"};
+  };
+  EXPECT_THAT(refusal(longer, {}), HasSubstr("position_m has 147 values, time_s has 97: give one per sample, or none"));
+  EXPECT_THAT(refusal({}, longer), HasSubstr("velocity_m_s has 147 values, time_s has 97"));
+  EXPECT_THAT(refusal(shorter, {}), HasSubstr("position_m has 96 values, time_s has 97"));
+}
+
 TEST(MissedTicks, AFitLeavesOutWhatIsFilledIn) {
   const auto ticks = most_ticks(1001, 0.03, 4);
   Recording run = sampled_at(position_run(kFluid, held(prbs_duty(0.6, 0.2, 10, kDtS), ticks), 1e-4, 5), ticks);
