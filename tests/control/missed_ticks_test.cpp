@@ -6,6 +6,7 @@
 #include <cmath>
 #include <random>
 
+#include "control/search/fit_statistics.hpp"
 #include "control/search/missed_ticks.hpp"
 #include "control/sensor/sensor_path.hpp"
 #include "recorded_runs.hpp"
@@ -69,7 +70,7 @@ void expect_within_sigmas(const Fit& fit, double sigmas) {
 
 TEST(MissedTicks, OnePercentCostsAPositionFitNothingButThoseValues) {
   const auto ticks = most_ticks(2001, 0.01, 3);
-  const Recording whole = position_run(kFluid, held(prbs_duty(0.6, 0.2, 20, kDtS), ticks), 1e-4, 5);
+  const Recording whole = position_run(kFluid, held(prbs_duty(0.6, 0.2, 20, kDtS), ticks), 1e-4, 6);
   const Recording run = sampled_at(whole, ticks);
   ASSERT_GT(missed_ticks(run), 15U);
   EXPECT_THAT(run.duty, testing::Pointwise(testing::DoubleNear(1e-9), whole.duty));
@@ -141,6 +142,23 @@ TEST(MissedTicks, AFitLeavesOutWhatIsFilledIn) {
   const Fit after = identify(run, one_start()).best;
   EXPECT_NEAR(after.model.b1 / before.model.b1, 1, 1e-6);
   EXPECT_NEAR(after.model.kp / before.model.kp, 1, 1e-6);
+}
+
+// The model's own outputs, at the ticks that were made, are the only other source of what these must be.
+TEST(MissedTicks, PercentAndWhitenessAreThoseOfTheTicksThatWereMade) {
+  const auto ticks = most_ticks(2001, 0.04, 7);
+  const Recording run = sampled_at(position_run(kFluid, held(prbs_duty(0.6, 0.2, 20, kDtS), ticks), 0.05, 5), ticks);
+  const Fit fit = identify(run, one_start()).best;
+  const std::vector<double> model_m = output_of(fit.model, Channel::position, kDtS, run.duty);
+  Eigen::VectorXd kept(std::ssize(ticks)), residual(std::ssize(ticks));
+  for (Eigen::Index i = 0; i < kept.size(); ++i) {
+    const std::size_t tick = ticks[static_cast<std::size_t>(i)];
+    kept[i] = run.position_m[tick];
+    residual[i] = kept[i] - model_m[tick] - fit.offset_m;
+  }
+  EXPECT_NEAR(fit.fit_percent, 100 * (1 - residual.norm() / (kept.array() - kept.mean()).matrix().norm()), 1e-6);
+  EXPECT_NEAR(*fit.position_whiteness_p_value, whiteness_p_value(residual), 1e-6);
+  EXPECT_NEAR(fit.residual_sd, residual.norm() / std::sqrt(static_cast<double>(ticks.size())), 1e-9);
 }
 
 TEST(MissedTicks, OfAnAccelerometerToo) {
