@@ -68,7 +68,7 @@ void add_uncertainty(OutputErrorSearch& search, const SearchPoint& point, const 
 
 void add_quality(const OutputErrorSearch& search, const Eigen::VectorXd& residual, const std::vector<double>& measured,
                  const std::vector<double>& sd_m, Fit& fit) {
-  fit.fit_percent = fit_percent({residual.begin(), residual.end()}, measured, sd_m);
+  fit.fit_percent = fit_percent(search, {residual.begin(), residual.end()}, measured, sd_m);
   const Eigen::VectorXd counted = search.counted(residual);
   fit.residual_sd = counted.norm() / std::sqrt(static_cast<double>(counted.size()));
 }
@@ -91,10 +91,11 @@ const std::vector<double>& measured_of(Channel channel, const Recording& recordi
                                         : recording.acceleration_m_s2;
 }
 
-void add_whiteness(const std::vector<Channel>& channels, const std::vector<Eigen::VectorXd>& residuals, Fit& fit) {
+void add_whiteness(const OutputErrorSearch& search, const std::vector<Eigen::VectorXd>& residuals, Fit& fit) {
+  const std::vector<Channel> channels = search.channels();
   fit.whiteness_p_value = 1;
   for (std::size_t c = 0; c < residuals.size(); ++c) {
-    const double p = whiteness_p_value(residuals[c]);
+    const double p = whiteness_p_value(search.counted(residuals[c]));
     p_value_of(channels[c], fit) = p;
     fit.whiteness_p_value = std::min(fit.whiteness_p_value, p);
   }
@@ -128,7 +129,7 @@ Fit summary(OutputErrorSearch& search, const Recording& recording, Cost cost, St
     fit.absolute_error += residuals[c].lpNorm<1>() * recording.dt_s;
   }
   add_quality(search, residuals.front(), *measured.front(), recording.position_sd_m, fit);
-  add_whiteness(channels, residuals, fit);
+  add_whiteness(search, residuals, fit);
   fit.aic = akaike(search, cost, residuals, measured, fit.free_parameters);
   if (found.starts > 0) add_uncertainty(search, found.point, residuals, cost, fit);
   return fit;

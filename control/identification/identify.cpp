@@ -57,7 +57,7 @@ Identification identify(const Recording& recording, const IdentificationOptions&
   add(second_opinions(search, recording, options, result.best));
   const bool order_is_forced = options.structure && *options.structure != Structure::fractional;
   add(amplitude_doubts(result.amplitude, recording, order_is_forced));
-  add(residual_doubts(recording, options, result.best));
+  add(residual_doubts(search, recording, options, result.best));
   add(identifiability_warnings(recording, result.best, options));
   add_verdict(result.compared, 1, warnings);
   add_rival(result.compared, warnings);

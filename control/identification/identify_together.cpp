@@ -54,7 +54,7 @@ std::vector<std::string> doubts_of(JointSearch& search, std::size_t i, const Rec
   append(warnings, second_opinions(search.of_run(i), recording, options, fit));
   const bool order_is_forced = options.structure && *options.structure != Structure::fractional;
   append(warnings, amplitude_doubts(amplitude, recording, order_is_forced));
-  append(warnings, residual_doubts(recording, options, fit));
+  append(warnings, residual_doubts(search.of_run(i), recording, options, fit));
   return warnings;
 }
 

@@ -149,6 +149,12 @@ void check_options(const IdentificationOptions& options, const Recording& record
 
 namespace {
 
+// Before samples are placed at their ticks, which reads every column as far as time_s goes.
+void check_size(const char* name, std::span<const double> values, std::size_t samples) {
+  if (values.empty() || values.size() == samples) return;
+  refuse(name, " has ", values.size(), " values, time_s has ", samples, ": give one per sample, or none");
+}
+
 struct Ticks {
   double dt_s = 0;
   std::vector<std::size_t> tick;  // of each sample
@@ -167,9 +173,9 @@ Ticks ticks_of(std::span<const double> time_s) {
       refuse("time_s steps by ", step_s, " s to sample ", k, ", and usually by ", usual_s,
              " s: resample to equal steps, within 1 %; only whole steps may be missing");
     }
-    if (ticks > kMostMissedInARow + 1) {
+    if (ticks - 1 > static_cast<double>(most_missed_in_a_row(usual_s))) {
       refuse("time_s steps by ", step_s, " s to sample ", k, ": ", ticks - 1, " steps of ", usual_s,
-             " s are missing, more than ", kMostMissedInARow, " in a row; cut the record there");
+             " s are missing, more than ", kLongestMissedS, " s in a row; cut the record there");
     }
     at.tick.push_back(at.tick.back() + static_cast<std::size_t>(ticks));
   }
@@ -192,6 +198,9 @@ Recording make_recording(std::span<const double> time_s, std::span<const double>
   check_column("time_s", time_s, samples);
   if (duty.size() != samples)
     refuse("duty has ", duty.size(), " values, time_s has ", samples, ": give one per sample");
+  check_size("position_m", position_m, samples);
+  check_size("velocity_m_s", velocity_m_s, samples);
+  check_size("acceleration_m_s2", acceleration_m_s2, samples);
   const Ticks at = ticks_of(time_s);
   Recording recording{at.dt_s,
                       {duty.begin(), duty.end()},

@@ -23,10 +23,16 @@ constexpr double kWhite = 0.01;
 struct ChannelResidual {
   const char* name;
   const char* unit;
-  const std::vector<double>& residual;
+  std::vector<double> residual;  // of the values that count
+  std::vector<double> sample;    // of each
   double fit_percent;
   double whiteness_p_value;
 };
+
+std::vector<double> counted(const OutputErrorSearch& search, const Eigen::VectorXd& values) {
+  const Eigen::VectorXd some = search.counted(values);
+  return {some.begin(), some.end()};
+}
 
 std::ostringstream three_digits() {
   std::ostringstream text;
@@ -36,8 +42,7 @@ std::ostringstream three_digits() {
 
 void add_poor_fit(const ChannelResidual& channel, const Fit& fit, std::vector<std::string>& warnings) {
   if (channel.fit_percent >= kPoorFitPercent) return;
-  if (&channel.residual == &fit.acceleration_residual_m_s2 && describes_run(fit))
-    return;  // noise is larger than motion
+  if (fit.sensor && describes_run(fit)) return;  // noise is larger than motion
   std::ostringstream text = three_digits();
   text << "the model explains only " << channel.fit_percent << " % of " << channel.name
        << ": it does not describe the run; look for a wrong sign or unit, columns that are shifted in time, "
@@ -60,10 +65,10 @@ void add_outliers(const ChannelResidual& channel, const Recording& recording, Co
   const auto count = std::ranges::count_if(size, [&](double s) { return s > limit; });
   if (count == 0) return;
   const auto first = std::ranges::find_if(size, [&](double s) { return s > limit; }) - size.begin();
+  const auto sample = static_cast<std::size_t>(channel.sample[static_cast<std::size_t>(first)]);
   std::ostringstream text = three_digits();
   text << count << " of the " << size.size() << " values of " << channel.name << " lie beyond 6 robust sd (" << limit
-       << ' ' << channel.unit << ") of the model, the first at " << time_of(recording, static_cast<std::size_t>(first))
-       << " s: "
+       << ' ' << channel.unit << ") of the model, the first at " << time_of(recording, sample) << " s: "
        << (cost == Cost::least_squares ? "they draw the fit to them; repair them, or use the absolute error cost"
                                        : "they weigh little in the absolute error cost, but look at them");
   warnings.push_back(text.str());
@@ -91,26 +96,31 @@ void add_colour(const ChannelResidual& channel, std::vector<std::string>& warnin
 
 }  // namespace
 
-double fit_percent(const std::vector<double>& residual, const std::vector<double>& measured,
-                   const std::vector<double>& sd_m) {
+double fit_percent(const OutputErrorSearch& search, const std::vector<double>& residual,
+                   const std::vector<double>& measured, const std::vector<double>& sd_m) {
   if (residual.empty()) return std::numeric_limits<double>::infinity();
   const auto n = static_cast<Index>(residual.size());
-  const Eigen::Map<const Eigen::VectorXd> r(residual.data(), n), y(measured.data(), n);
-  Eigen::ArrayXd weight = Eigen::ArrayXd::Ones(n);
+  const Eigen::VectorXd r = search.counted(Eigen::Map<const Eigen::VectorXd>(residual.data(), n));
+  const Eigen::ArrayXd y = search.counted(Eigen::Map<const Eigen::VectorXd>(measured.data(), n));
+  Eigen::ArrayXd weight = Eigen::ArrayXd::Ones(y.size());
   if (!sd_m.empty()) weight = sd_of_mean_weight(sd_m) / Eigen::Map<const Eigen::ArrayXd>(sd_m.data(), n);
-  const double mean = (weight.square() * y.array()).sum() / weight.square().sum();
-  return 100 * (1 - r.norm() / (weight * (y.array() - mean)).matrix().norm());
+  const double mean = (weight.square() * y).sum() / weight.square().sum();
+  return 100 * (1 - r.norm() / (weight * (y - mean)).matrix().norm());
 }
 
-std::vector<std::string> residual_doubts(const Recording& recording, const IdentificationOptions& options,
-                                         const Fit& fit) {
+std::vector<std::string> residual_doubts(const OutputErrorSearch& search, const Recording& recording,
+                                         const IdentificationOptions& options, const Fit& fit) {
   if (fit.end != SearchEnd::converged && fit.end != SearchEnd::iteration_limit) return {};  // not the model's doing
   std::vector<ChannelResidual> channels;
   const auto take = [&](const char* name, const char* unit, const std::vector<double>& residual,
                         const std::vector<double>& measured, std::optional<double> p_value,
                         const std::vector<double>& sd_m = {}) {
-    const double percent = fit_percent(residual, measured, sd_m);
-    if (percent < kFitOfRounding) channels.push_back({name, unit, residual, percent, p_value.value_or(1)});
+    const double percent = fit_percent(search, residual, measured, sd_m);
+    if (!(percent < kFitOfRounding)) return;
+    const auto n = static_cast<Index>(residual.size());
+    channels.push_back({name, unit, counted(search, Eigen::Map<const Eigen::VectorXd>(residual.data(), n)),
+                        counted(search, Eigen::VectorXd::LinSpaced(n, 0, static_cast<double>(n - 1))), percent,
+                        p_value.value_or(1)});
   };
   const char* position_unit = recording.position_sd_m.empty() ? "m" : "m as weighed by position_sd_m";
   take("position_m", position_unit, fit.position_residual_m, recording.position_m, fit.position_whiteness_p_value,

@@ -9,16 +9,16 @@
 #include <string>
 #include <vector>
 
-#include "control/search/fit.hpp"
+#include "control/search/output_error_search.hpp"
 
 namespace control {
 
-std::vector<std::string> residual_doubts(const Recording& recording, const IdentificationOptions& options,
-                                         const Fit& fit);
+std::vector<std::string> residual_doubts(const OutputErrorSearch& search, const Recording& recording,
+                                         const IdentificationOptions& options, const Fit& fit);
 
-// 100 (1 - |residual|/|measured - mean|); infinite for a recording without residuals. Where the residuals are weighed
-// by the sds of positions, so are the measured values and their mean.
-double fit_percent(const std::vector<double>& residual, const std::vector<double>& measured,
-                   const std::vector<double>& sd_m = {});
+// 100 (1 - |residual|/|measured - mean|) of the values that count in the search; infinite for a recording without
+// residuals. Where the residuals are weighed by the sds of positions, so are the measured values and their mean.
+double fit_percent(const OutputErrorSearch& search, const std::vector<double>& residual,
+                   const std::vector<double>& measured, const std::vector<double>& sd_m = {});
 
 }  // namespace control

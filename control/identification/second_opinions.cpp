@@ -25,10 +25,10 @@ constexpr double kRoughBeginning = 3;                     // times the size of t
 constexpr double kNoticeableLagS = 0.002;                 // twice what the age of the samples is known to
 constexpr double kMotionSigmas = 5, kMotionShare = 0.01;  // of v0, and of the squares that it explains
 
-double lowest_percent(const Recording& recording, const Fit& fit) {
-  return std::min({fit_percent(fit.position_residual_m, recording.position_m, recording.position_sd_m),
-                   fit_percent(fit.velocity_residual_m_s, recording.velocity_m_s),
-                   fit_percent(fit.acceleration_residual_m_s2, recording.acceleration_m_s2)});
+double lowest_percent(const OutputErrorSearch& search, const Recording& recording, const Fit& fit) {
+  return std::min({fit_percent(search, fit.position_residual_m, recording.position_m, recording.position_sd_m),
+                   fit_percent(search, fit.velocity_residual_m_s, recording.velocity_m_s),
+                   fit_percent(search, fit.acceleration_residual_m_s2, recording.acceleration_m_s2)});
 }
 
 std::optional<Fit> fit_again(const OutputErrorSearch& search, const Recording& recording, IdentificationOptions options,
@@ -44,7 +44,7 @@ std::optional<Fit> fit_again(const OutputErrorSearch& search, const Recording& r
 
 void add_turned_sign(const OutputErrorSearch& search, const Recording& recording, const IdentificationOptions& options,
                      const Fit& fit, std::vector<std::string>& warnings) {
-  const double percent = lowest_percent(recording, fit);
+  const double percent = lowest_percent(search, recording, fit);
   if (!(percent < kLookForSignPercent)) return;
   const bool has_both = !recording.position_m.empty() && !recording.velocity_m_s.empty();
   std::vector<std::pair<std::string, Recording>> turned{{"the duty (or of all that was measured)", recording}};
@@ -57,7 +57,7 @@ void add_turned_sign(const OutputErrorSearch& search, const Recording& recording
   for (const auto& [name, other] : turned) {
     const auto found = fit_again(search, other, options, fit.structure);
     if (!found) continue;
-    const double better = lowest_percent(other, *found);
+    const double better = lowest_percent(search, other, *found);
     if (!(100 - better < (100 - percent) / 2)) continue;
     std::ostringstream text;
     text.precision(3);
@@ -82,37 +82,41 @@ void add_missing_offset(const OutputErrorSearch& search, const Recording& record
   warnings.push_back(text.str());
 }
 
-// Residuals and slopes of all channels, in units of the channel's sd.
+// Residuals and slopes of all channels, of the values that count, in units of the channel's sd.
 struct Stacked {
   Eigen::VectorXd residual;
   Eigen::MatrixXd slopes;
   std::vector<Channel> channels;
   std::vector<double> sd;
+  Eigen::ArrayXd tick;  // of each value of a channel
 };
 
 Stacked stacked(OutputErrorSearch& search, const Recording& recording, const Fit& fit) {
   const SearchPoint point{fit.model, fit.offset_m};
   const auto residuals = search.residuals(point);
   const auto jacobians = search.jacobians(fit.structure, point);
-  const Index samples = static_cast<Index>(recording.duty.size()), rows = samples * std::ssize(residuals);
-  Stacked all{Eigen::VectorXd(rows), Eigen::MatrixXd(rows, jacobians.front().cols()), search.channels(), {}};
+  const Index ticks = static_cast<Index>(recording.duty.size());
+  const Eigen::VectorXd tick = search.counted(Eigen::VectorXd::LinSpaced(ticks, 0, static_cast<double>(ticks - 1)));
+  const Index values = tick.size(), rows = values * std::ssize(residuals);
+  Stacked all{Eigen::VectorXd(rows), Eigen::MatrixXd(rows, jacobians.front().cols()), search.channels(), {}, tick};
   for (std::size_t c = 0; c < residuals.size(); ++c) {
-    const Index row = static_cast<Index>(c) * samples;
-    all.sd.push_back(std::max(1e-200, residuals[c].norm() / std::sqrt(static_cast<double>(samples))));
-    all.residual.segment(row, samples) = residuals[c] / all.sd[c];
-    all.slopes.middleRows(row, samples) = jacobians[c] / all.sd[c];
+    const Index row = static_cast<Index>(c) * values;
+    all.sd.push_back(std::max(1e-200, residuals[c].norm() / std::sqrt(static_cast<double>(values))));
+    all.residual.segment(row, values) = search.counted(residuals[c]) / all.sd[c];
+    for (Index j = 0; j < all.slopes.cols(); ++j) {
+      all.slopes.col(j).segment(row, values) = search.counted(jacobians[c].col(j)) / all.sd[c];
+    }
   }
   return all;
 }
 
 // To an initial velocity of 1 m/s.
 Eigen::VectorXd response_to_motion(const Stacked& all, double dt_s, double lag_s) {
-  const Index samples = all.residual.size() / std::ssize(all.channels);
-  const Eigen::ArrayXd decay =
-      (Eigen::ArrayXd::LinSpaced(samples, 0, static_cast<double>(samples - 1)) * (-dt_s / lag_s)).exp();
+  const Index values = all.tick.size();
+  const Eigen::ArrayXd decay = (all.tick * (-dt_s / lag_s)).exp();
   Eigen::VectorXd response(all.residual.size());
   for (std::size_t c = 0; c < all.channels.size(); ++c) {
-    auto part = response.segment(static_cast<Index>(c) * samples, samples);
+    auto part = response.segment(static_cast<Index>(c) * values, values);
     if (all.channels[c] == Channel::position) {
       part = lag_s * (1 - decay) / all.sd[c];
     } else {
@@ -135,10 +139,10 @@ InitialMotion motion_with_lag(const Stacked& all, const Eigen::ColPivHouseholder
   if (!(size > 1e-8 * motion.squaredNorm())) return {};
   const double velocity_m_s = own.dot(all.residual) / size;
   const Eigen::VectorXd rest = all.residual - velocity_m_s * own;
-  const Index samples = all.residual.size() / std::ssize(all.channels);
+  const Index values = all.tick.size();
   double per_independent_one = 1;
-  for (Index row = 0; row < rest.size(); row += samples) {
-    per_independent_one = std::max(per_independent_one, samples_per_independent_one(rest.segment(row, samples)));
+  for (Index row = 0; row < rest.size(); row += values) {
+    per_independent_one = std::max(per_independent_one, samples_per_independent_one(rest.segment(row, values)));
   }
   const double sd = std::sqrt(rest.squaredNorm() / static_cast<double>(rest.size()) * per_independent_one / size);
   return {velocity_m_s, std::abs(velocity_m_s) / std::max(1e-300, sd),
@@ -183,7 +187,7 @@ std::string bent_in_words(const std::vector<int>& free, const Eigen::VectorXd& b
 
 void add_initial_motion(OutputErrorSearch& search, const Recording& recording, const Fit& fit,
                         std::vector<std::string>& warnings) {
-  if (!(lowest_percent(recording, fit) < 100 - 1e-6)) return;  // rounding
+  if (!(lowest_percent(search, recording, fit) < 100 - 1e-6)) return;  // rounding
   Stacked all = stacked(search, recording, fit);
   const Eigen::VectorXd scale = all.slopes.colwise().norm().transpose().cwiseMax(1e-300).cwiseInverse();
   all.slopes *= scale.asDiagonal();

@@ -28,8 +28,8 @@ struct Recording {
   // record. Empty: position_m has one value per sample.
   std::vector<double> position_time_s = {};
   std::vector<double> position_sd_m = {};  // of each of them; empty: all alike
-  // Ticks at which nothing was measured: the duty holds, other values are filled in and count for nothing
-  // (missed_ticks.hpp). Empty: none.
+  // Ticks at which nothing was measured: duty and values are filled in (missed_ticks.hpp), and the fit leaves the
+  // values out. Empty: none.
   std::vector<bool> is_missed = {};
 };
 

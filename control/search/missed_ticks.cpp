@@ -1,7 +1,9 @@
-// Holds the duty, draws lines through positions and velocities, and marks what was not measured.
+// Holds the duty until the motor goes off, draws lines through positions and velocities, and marks what was not
+// measured.
 #include "control/search/missed_ticks.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <vector>
 
 #include "base/invalid_argument.hpp"
@@ -24,7 +26,24 @@ std::vector<double> filled(const std::vector<double>& values, std::span<const st
   return all;
 }
 
+// A period in which the motor goes off has the mean of its duty.
+std::vector<double> duty_of_motor(const std::vector<double>& duty, std::span<const std::size_t> ticks, double dt_s) {
+  std::vector<double> all = filled(duty, ticks, Fill::hold);
+  for (std::size_t k = 0; k + 1 < ticks.size(); ++k) {
+    for (std::size_t tick = ticks[k] + 1; tick < ticks[k + 1]; ++tick) {
+      const double held_s = kMotorOffS - dt_s * static_cast<double>(tick - ticks[k]);
+      all[tick] *= std::clamp(held_s / dt_s, 0.0, 1.0);
+    }
+  }
+  return all;
+}
+
 }  // namespace
+
+std::size_t most_missed_in_a_row(double dt_s) {
+  constexpr double kRounding = 0.01;  // of a period: stored times are rounded
+  return static_cast<std::size_t>(std::floor(kLongestMissedS / dt_s + kRounding));
+}
 
 bool may_be_missed(std::size_t missed, std::size_t ticks) {
   return static_cast<double>(missed) <= kMostMissedShare * static_cast<double>(ticks);
@@ -32,7 +51,7 @@ bool may_be_missed(std::size_t missed, std::size_t ticks) {
 
 void place_at_ticks(Recording& recording, std::span<const std::size_t> ticks) {
   if (ticks.empty() || ticks.back() + 1 == ticks.size()) return;
-  recording.duty = filled(recording.duty, ticks, Fill::hold);
+  recording.duty = duty_of_motor(recording.duty, ticks, recording.dt_s);
   recording.velocity_m_s = filled(recording.velocity_m_s, ticks, Fill::line);
   recording.acceleration_m_s2 = filled(recording.acceleration_m_s2, ticks, Fill::hold);
   if (recording.position_time_s.empty()) recording.position_m = filled(recording.position_m, ticks, Fill::line);
@@ -48,10 +67,11 @@ std::string missed_ticks_in_words(const Recording& recording) {
   const std::size_t missed = missed_ticks(recording), ticks = recording.is_missed.size();
   if (missed == 0) return {};
   const auto first = std::ranges::find(recording.is_missed, true) - recording.is_missed.begin();
-  return base::join_text(missed, " of ", ticks, " ticks are missing, the first at ",
-                         recording.dt_s * static_cast<double>(first),
-                         " s: they count for nothing, and the duty before each is taken to hold through it, as a robot "
-                         "that skips a period keeps it");
+  return base::join_text(
+      missed, " of ", ticks, " ticks are missing, the first at ", recording.dt_s * static_cast<double>(first),
+      " s: the fit leaves them out; the duty before them is assumed to have held for ", 1e3 * kMotorOffS,
+      " ms and to have been 0 from then to the next tick, as the board of this "
+      "robot turns its motor off");
 }
 
 }  // namespace control

@@ -1,9 +1,9 @@
 // Puts samples at the ticks at which they were made, where a robot or a logger left some ticks out.
 //
-// A motor keeps its duty while no tick changes it, so the duty before a missed tick holds through it; nothing was
-// measured there, so nothing there counts in a fit. Fills in every channel: positions and velocities on a straight
-// line, accelerations with the last one, as a sensor that was not read. Errors: none thrown; what may be missed is
-// asked of may_be_missed() first.
+// The duty holds for kMotorOffS after the last tick and is 0 from there to the next: so the board of this robot does
+// it, and of another robot it is an assumption. Nothing was measured at a missed tick, so a fit leaves it out. Fills in
+// every channel: positions and velocities on a straight line, accelerations with the last one, as a sensor that was not
+// read. Errors: none thrown; what may be missed is asked of may_be_missed() and most_missed_in_a_row() first.
 #pragma once
 
 #include <cstddef>
@@ -14,9 +14,11 @@
 
 namespace control {
 
-inline constexpr std::size_t kMostMissedInARow = 25;  // 0.25 s at 100 Hz; a longer hole is one that nobody explains
-inline constexpr double kMostMissedShare = 0.05;      // of the ticks
+inline constexpr double kMotorOffS = 0.05;        // robot_fw::kMotorOffS; a period that is longer holds to its end
+inline constexpr double kLongestMissedS = 0.25;   // in a row; a longer hole is one that nobody explains
+inline constexpr double kMostMissedShare = 0.05;  // of the ticks
 
+std::size_t most_missed_in_a_row(double dt_s);
 bool may_be_missed(std::size_t missed, std::size_t ticks);
 
 // ticks[k]: at which tick sample k was made, ascending from 0. Positions with times of their own stay as they are.

@@ -72,7 +72,7 @@ double usual_step_s(const Piece& piece) {
 }
 
 // What is wrong between two neighbours, if anything. Stored times are right to 100 us, so whole periods are asked for
-// within a tenth of one. A robot that skips a few keeps its duty: they are missed ticks, and no fault.
+// within a tenth of one. A few that the robot skipped are missed ticks, and no fault.
 std::optional<std::string> gap_between(const Piece& piece, const storage::StoredSample& before,
                                        const storage::StoredSample& after, double dt_s, double most_skipped) {
   const double at_s = piece.seconds(before), step_s = piece.seconds(after) - at_s;
@@ -301,7 +301,7 @@ Result<RunRecording> recording_of(std::span<const storage::StoredSample> samples
   const Motion motion = outside.is_enough() ? Motion::outside
                         : position_sd_m > 0 ? Motion::acceleration
                                             : Motion::position;
-  Cut cut{*piece, window, dt_s, motion, control::kMostMissedInARow};
+  Cut cut{*piece, window, dt_s, motion, static_cast<double>(control::most_missed_in_a_row(dt_s))};
   std::vector<std::size_t> ticks;
   if (cut.is_whole()) {
     ticks = ticks_of(*piece, dt_s);
