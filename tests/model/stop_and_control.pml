@@ -90,11 +90,11 @@ mtype = { welcome, stop, clear, duty, automatic, timed, renew, drop };   /* to t
 mtype = { hello, stop_ack, clear_ack, drop_ack, sample };                /* to the station */
 mtype = { at_rest, manual, in_auto };
 
-/* The frames of the connection, in order. A command has: the stop or emergency that it names, the boot it is for, the
- * era in which it expires, and for the assertions: whose time of control it is of, over which connection it was sent,
- * the stops asked for and promised until then; of a clear instead the moment of the latch that its sender has seen. */
+/* The frames of the connection, in order. A command has: the stop, emergency or drop that it names, the boot it is for,
+ * the era in which it expires, and for the assertions: whose time of control it is of, over which connection it was
+ * sent, the stops asked for and promised until then; of a clear instead the moment of the latch that its sender has seen. */
 chan to_robot = [ROOM] of { mtype, byte, byte, byte, byte, byte, byte, byte };
-chan to_station = [ROOM] of { mtype, byte, byte, byte, byte };  /* kind, stop or boot, connection, latch, moment */
+chan to_station = [ROOM] of { mtype, byte, byte, byte, byte };  /* kind, what it names or boot, connection, latch, moment */
 chan queue = [1] of { mtype, byte, byte, byte, byte, byte, byte, byte };  /* in the station, behind the stop's lane */
 
 byte era = 1;
@@ -106,7 +106,7 @@ byte moment;                         /* counts each change of the latch, in the 
 byte latched_at;                     /* the moment of the latch in force */
 mtype motion = at_rest;
 byte lease;                          /* the era with which the duty ends; a renewal adds the next one */
-byte timed_of, timed_until, timed_lease, timed_stops;   /* one command that waits; timed_of 0: none */
+byte timed_of, timed_until, timed_lease, timed_stops, timed_promises;   /* one command that waits; timed_of 0: none */
 byte remembered;                     /* stops that this boot has obeyed, as bits */
 bool has_sample; byte sample_latch, sample_moment, sampled = 255;
 byte held_stop, held_latch, held_moment;                /* an acknowledgement that could not be sent; 0: none */
@@ -117,7 +117,8 @@ byte pending, lane;                  /* the newest stop without an answer; what 
 byte known_latch, known_moment;
 byte holder, tenure;                 /* who is in control (0: nobody), and the how manieth time of control it is */
 byte may_wait;                       /* of which tenure timed commands may wait on the robot */
-bool drop_due, drop_sent;
+bool drop_due;
+byte drops, drop_sent;               /* how many were sent; the one that has no answer yet, 0: none */
 byte stored_pending, stored_latch, stored_moment;   /* on disk */
 byte seen_latch, seen_moment;        /* what the operators' pages show, maybe long ago */
 
@@ -202,13 +203,21 @@ inline report(kind, name) {
 
 /* ---------------------------------------------------------------- The robot */
 
+inline come_to_rest() {
+  motion = at_rest; lease = 0
+}
+
+inline drop_timed() {
+  timed_of = 0; timed_until = 0; timed_lease = 0; timed_stops = 0; timed_promises = 0
+}
+
 inline end_orders() {
   if
-  :: STOP_ENDS_ORDERS -> motion = at_rest
+  :: STOP_ENDS_ORDERS -> come_to_rest()
   :: else
   fi;
   if
-  :: STOP_DROPS_TIMED -> timed_of = 0
+  :: STOP_DROPS_TIMED -> drop_timed()
   :: else
   fi
 }
@@ -270,11 +279,11 @@ inline run_command(kind, name, for_boot, until, whose, over, stops, promises) {
       report(clear_ack, 0)
     :: else
     fi
-  :: kind == drop -> timed_of = 0; skip; report(drop_ack, 0)
+  :: kind == drop -> drop_timed(); report(drop_ack, name)
   :: kind == timed ->
     if
     :: timed_of == 0 || timed_of == whose ->
-      timed_of = whose; timed_until = until; timed_lease = era; timed_stops = stops
+      timed_of = whose; timed_until = until; timed_lease = era; timed_stops = stops; timed_promises = promises
     :: else                          /* no room */
     fi;
     reign = (whose > reign -> whose : reign)
@@ -282,7 +291,7 @@ inline run_command(kind, name, for_boot, until, whose, over, stops, promises) {
     if
     :: motion == manual || timed_of != 0 ->
       assert(motion == manual || timed_of >= whose);   /* nobody renews what a former holder has left waiting */
-      lease = era + 1; timed_lease = (timed_of != 0 -> era + 1 : 0);
+      lease = (motion == manual -> era + 1 : 0); timed_lease = (timed_of != 0 -> era + 1 : 0);
       reign = (whose > reign -> whose : reign);
       skip
     :: else
@@ -293,7 +302,7 @@ inline run_command(kind, name, for_boot, until, whose, over, stops, promises) {
     if
     :: kind == duty && motion != in_auto -> motion = manual; lease = era; robot_does(duty, whose)
     :: kind == duty && motion == in_auto           /* wrong_mode */
-    :: kind == automatic -> motion = in_auto; lease = 0; timed_of = 0; robot_does(automatic, whose)
+    :: kind == automatic -> motion = in_auto; lease = 0; drop_timed(); robot_does(automatic, whose)
     fi
   fi
 }
@@ -344,10 +353,10 @@ end:
       if
       :: TIMED_EXPIRED && timed_until < era
       :: else ->
-        check_motion(timed_until, timed_of, timed_stops, 0);
+        check_motion(timed_until, timed_of, timed_stops, timed_promises);
         motion = manual; lease = era
       fi;
-      timed_of = 0; timed_until = 0; timed_lease = 0; timed_stops = 0
+      drop_timed()
     }
   :: atomic { faults < FAULTS && latch == 0 -> faults++; enter_emergency(); robot_does(EMERGENCY, 0) }
   :: atomic { !has_sample && sampled != moment && connection != 0 ->
@@ -370,24 +379,24 @@ end:
       era++;
       if
       :: DUTY_LAPSES && motion == manual && lease < era ->
-        motion = at_rest;
+        come_to_rest();
         robot_does(LAPSE, 0);
-        timed_of = 0
+        drop_timed()
       :: else
       fi;
       if
-      :: TIMED_LAPSE && timed_of != 0 && timed_lease < era -> timed_of = 0
+      :: TIMED_LAPSE && timed_of != 0 && timed_lease < era -> drop_timed()
       :: else
       fi;
       if
       :: heard + 1 < era ->
         robot_does(SILENCE, 0);
         if
-        :: LINK_LOSS_STOPS -> motion = at_rest
+        :: LINK_LOSS_STOPS -> come_to_rest()
         :: else
         fi;
         if
-        :: LINK_LOSS_DROPS -> timed_of = 0
+        :: LINK_LOSS_DROPS -> drop_timed()
         :: else
         fi
       :: else
@@ -399,9 +408,9 @@ end:
   :: atomic { boot < BOOTS ->
       boot++;
       connection = 0; is_welcome = false; lose_commands(to_robot);
-      remembered = 0; held_stop = 0; has_sample = false; timed_of = 0;
+      remembered = 0; held_stop = 0; has_sample = false; drop_timed();
       if
-      :: BOOTS_AT_REST -> motion = at_rest
+      :: BOOTS_AT_REST -> come_to_rest()
       :: else
       fi;
       if
@@ -449,13 +458,13 @@ inline on_hello(new_boot, new_connection, its_latch, its_moment) {
   end_of_connection();
   served = new_connection;
   if
-  :: new_boot != served_boot -> may_wait = (may_wait == EVERY_TENURE -> EVERY_TENURE : 0); drop_sent = false
+  :: new_boot != served_boot -> may_wait = 0; drop_sent = 0      /* a reset loses them */
   :: else
   fi;
   served_boot = new_boot;
   known_latch = its_latch;
   known_moment = its_moment;
-  drop_due = DROP_AFTER_LINK && (may_wait != 0 || drop_sent);
+  drop_due = DROP_AFTER_LINK && (may_wait != 0 || drop_sent != 0);
   write(welcome, 0, 0, 0, served, 0, 0);
   station_does(CONNECTED, 0);
   if
@@ -487,7 +496,7 @@ end:
         learn(its_latch, its_moment, its_moment >= known_moment);
         pending = (name >= pending -> 0 : pending)                /* it settles those before it */
       :: kind == clear_ack && over == served -> learn(its_latch, its_moment, its_moment > known_moment)
-      :: kind == drop_ack && over == served -> drop_sent = false
+      :: kind == drop_ack && over == served -> drop_sent = (name == drop_sent -> 0 : drop_sent)
       :: kind == sample && over == served -> learn(its_latch, its_moment, its_moment >= known_moment)
       fi;
       kind = 0; name = 0; over = 0; its_latch = 0; its_moment = 0
@@ -503,8 +512,8 @@ end:
       kind = 0; name = 0; for_boot = 0; until = 0; whose = 0; over = 0; stops = 0; promises = 0
     }
   :: atomic { served != 0 && drop_due && empty(queue) ->
-      drop_due = false; drop_sent = true; may_wait = 0;
-      queue!drop, 0, served_boot, era + 1, tenure, served, asked, promised }
+      drop_due = false; drops++; drop_sent = drops; may_wait = 0;
+      queue!drop, drops, served_boot, era + 1, tenure, served, asked, promised }
   :: atomic { served != 0 && pending != 0 && lane == 0 && repeats < REPEATS -> repeats++; lane = pending }
   :: atomic { served != 0 -> station_does(SILENCE, 0); end_of_connection() }
   :: atomic { holder != 0 -> holder = 0; station_does(CONTROL, 0); control_ended() }   /* released or expired */
@@ -520,7 +529,7 @@ end:
       must_stand = must_stand && (latch != 0 || obeyed > forgotten_to);
       pending = (STOP_RESTORED -> stored_pending : 0);
       known_latch = (LATCH_RESTORED -> stored_latch : 0);
-      known_moment = stored_moment; holder = 0; answerable = 0; drop_due = false; drop_sent = false;
+      known_moment = stored_moment; holder = 0; answerable = 0; drop_due = false; drop_sent = 0;
       may_wait = (DROP_AFTER_RESTART -> EVERY_TENURE : 0);
       station_does(RESTART, 0)
     }
