@@ -173,7 +173,7 @@ Ticks ticks_of(std::span<const double> time_s) {
       refuse("time_s steps by ", step_s, " s to sample ", k, ", and usually by ", usual_s,
              " s: resample to equal steps, within 1 %; only whole steps may be missing");
     }
-    if (ticks - 1 > static_cast<double>(most_missed_in_a_row(usual_s))) {
+    if (ticks - 1 > most_missed_in_a_row(usual_s)) {
       refuse("time_s steps by ", step_s, " s to sample ", k, ": ", ticks - 1, " steps of ", usual_s,
              " s are missing, more than ", kLongestMissedS, " s in a row; cut the record there");
     }

@@ -40,9 +40,9 @@ std::vector<double> duty_of_motor(const std::vector<double>& duty, std::span<con
 
 }  // namespace
 
-std::size_t most_missed_in_a_row(double dt_s) {
+double most_missed_in_a_row(double dt_s) {
   constexpr double kRounding = 0.01;  // of a period: stored times are rounded
-  return static_cast<std::size_t>(std::floor(kLongestMissedS / dt_s + kRounding));
+  return std::floor(kLongestMissedS / dt_s + kRounding);
 }
 
 bool may_be_missed(std::size_t missed, std::size_t ticks) {

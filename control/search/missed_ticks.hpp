@@ -18,7 +18,7 @@ inline constexpr double kMotorOffS = 0.05;        // robot_fw::kMotorOffS; a per
 inline constexpr double kLongestMissedS = 0.25;   // in a row; a longer hole is one that nobody explains
 inline constexpr double kMostMissedShare = 0.05;  // of the ticks
 
-std::size_t most_missed_in_a_row(double dt_s);
+double most_missed_in_a_row(double dt_s);  // ticks
 bool may_be_missed(std::size_t missed, std::size_t ticks);
 
 // ticks[k]: at which tick sample k was made, ascending from 0. Positions with times of their own stay as they are.

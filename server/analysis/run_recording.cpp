@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <ranges>
 #include <utility>
 
@@ -100,6 +101,35 @@ std::vector<std::size_t> ticks_of(const Piece& piece, double dt_s) {
   return ticks;
 }
 
+// The longest window from rest of whose ticks few enough are missing; none: each is too short.
+std::optional<RunWindow> with_few_missed(const Piece& piece, std::span<const std::size_t> ticks, RunWindow window) {
+  constexpr double kShare = control::kMostMissedShare, kRounding = 1e-6;
+  std::vector<double> excess(ticks.size());  // from i to j too many are missing if it grows by more than kShare
+  for (std::size_t k = 0; k < ticks.size(); ++k) {
+    excess[k] = (1 - kShare) * static_cast<double>(ticks[k]) - static_cast<double>(k);
+  }
+  std::vector<double> least = excess;  // from here on
+  for (std::size_t k = least.size() - 1; k > 0; --k) least[k - 1] = std::min(least[k - 1], least[k]);
+  std::size_t begin = 0, size = 0;
+  double driven_at_s = -std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < ticks.size(); ++i) {
+    const double at_s = piece.seconds(piece.samples[i]);
+    const auto after = std::ranges::upper_bound(least, excess[i] + kShare - kRounding) - least.begin();
+    const std::size_t reached = static_cast<std::size_t>(after) - i;
+    if ((i == 0 || at_s - driven_at_s > kTimeToRest_s) && reached > size) {
+      begin = i;
+      size = reached;
+    }
+    if (!(piece.samples[i].sample.duty == 0)) driven_at_s = at_s;
+  }
+  if (size < kFewestSamples) return std::nullopt;
+  window.span = piece.samples[begin].span;
+  window.from_s = piece.seconds(piece.samples[begin]);
+  window.to_s = piece.seconds(piece.samples[begin + size - 1]);
+  window.cuts_at_gaps = false;
+  return window;
+}
+
 double largest_position_sd_m(const Piece& piece) {
   double largest_m = 0;
   for (const storage::StoredSample& stored : piece.samples) {
@@ -157,7 +187,6 @@ class Cut {
     window.span = piece.samples[part.begin].span;
     window.from_s = piece.seconds(piece.samples[part.begin]);
     window.to_s = piece.seconds(piece.samples[part.end - 1]);
-    window.cuts_at_gaps = false;
     return window;
   }
 
@@ -301,24 +330,29 @@ Result<RunRecording> recording_of(std::span<const storage::StoredSample> samples
   const Motion motion = outside.is_enough() ? Motion::outside
                         : position_sd_m > 0 ? Motion::acceleration
                                             : Motion::position;
-  Cut cut{*piece, window, dt_s, motion, static_cast<double>(control::most_missed_in_a_row(dt_s))};
-  std::vector<std::size_t> ticks;
-  if (cut.is_whole()) {
-    ticks = ticks_of(*piece, dt_s);
-    const std::size_t missed = ticks.back() + 1 - ticks.size();
-    if (!control::may_be_missed(missed, ticks.back() + 1)) cut = Cut{*piece, window, dt_s, motion, 0};
-  }
+  const Cut cut{*piece, window, dt_s, motion, control::most_missed_in_a_row(dt_s)};
+  const auto recorded_from = [&](const RunWindow& part, const std::string& why) {
+    auto recorded = recording_of(samples, part, reference, choice);
+    if (recorded) recorded->warnings.push_back(fmt::format("{}, from {:.3f} to {:.3f} s", why, part.from_s, part.to_s));
+    return recorded;
+  };
   if (!cut.is_whole()) {
     const auto part = window.cuts_at_gaps ? cut.longest(*piece, window) : std::nullopt;
     if (!part) return cut.refusal(*piece);
-    auto recorded = recording_of(samples, *part, reference, choice);
-    if (recorded) {
-      recorded->warnings.push_back(fmt::format(
-          "the recording has gaps: fitted is its longest part without one that begins at rest, from {:.3f} to "
-          "{:.3f} s",
-          part->from_s, part->to_s));
+    return recorded_from(*part, "the recording has gaps: fitted is its longest part without one that begins at rest");
+  }
+  const std::vector<std::size_t> ticks = ticks_of(*piece, dt_s);
+  const std::size_t all = ticks.back() + 1, left_out = all - ticks.size();
+  if (!control::may_be_missed(left_out, all)) {
+    const std::string skipped = fmt::format("the robot skipped {} of {} periods, more than {:g} %", left_out, all,
+                                            100 * control::kMostMissedShare);
+    const auto part = with_few_missed(*piece, ticks, window);
+    if (!part) return fail(ErrorCode::invalid, skipped + "; no part of it is long enough", "gap");
+    if (window.cuts_at_gaps) {
+      return recorded_from(*part, skipped + ": fitted is the longest part with fewer that begins at rest");
     }
-    return recorded;
+    return fail(ErrorCode::invalid, fmt::format("{}; choose --from-s {} --to-s {}", skipped, part->from_s, part->to_s),
+                "gap");
   }
   RunRecording made{{}, channels_reason(position_sd_m), {}};
   control::Recording& recording = made.recording;

@@ -251,6 +251,19 @@ void write_text(std::ostream& out, std::span<const analysis::RunOfMany> runs, co
   }
 }
 
+// Of which the model explains nothing: "0.3 % of run 7".
+std::vector<std::string> unexplained_runs(std::span<const analysis::RunOfMany> runs,
+                                          const control::Identification& found) {
+  std::vector<std::string> words;
+  for (std::size_t i = 0; i < runs.size(); ++i) {
+    const control::Fit& fit = found.runs.empty() ? found.best : found.runs[i].fit;
+    if (!control::explains_nothing(runs[i].recorded.recording, fit)) continue;
+    const std::string run = runs.size() == 1 ? "the run" : fmt::format("run {}", runs[i].run);
+    words.push_back(fmt::format("{} % of {}", fixed(fit.fit_percent, 1), run));
+  }
+  return words;
+}
+
 }  // namespace
 
 void add_options(CLI::App& command, Identify& options) {
@@ -267,7 +280,7 @@ void add_options(CLI::App& command, Identify& options) {
     command.get_option("--plan")->excludes(searching);
   }
   command.footer(
-      "Exit status 4: the search did not converge, or the model explains nothing of the run; what was found is "
+      "Exit status 4: the search did not converge, or the model explains nothing of any run; what was found is "
       "printed.\n"
       "Example: rheonaut identify --csv run.csv --structure fractional");
 }
@@ -290,12 +303,17 @@ int run(const Identify& options, std::ostream& out) {
                "rheonaut: no model fits this recording with finite numbers; are its units and columns right?\n");
     return kNotConverged;
   }
-  if (control::explains_nothing(runs.front().recorded.recording, found.best)) {
+  const std::vector<std::string> unexplained = unexplained_runs(runs, found);
+  if (unexplained.size() == runs.size()) {
     fmt::print(stderr,
-               "rheonaut: the model explains {} % of the run, so its parameters say nothing; record a run in which the "
-               "duty changes and the robot moves\n",
-               fixed(found.best.fit_percent, 1));
+               "rheonaut: the model explains {}, so its parameters say nothing; record a run in which the duty changes "
+               "and the robot moves\n",
+               fmt::join(unexplained, " and "));
     return kNotConverged;
+  }
+  if (!unexplained.empty()) {
+    fmt::print(stderr, "rheonaut: warning: the model explains {} only; its parameters come from the other runs\n",
+               fmt::join(unexplained, " and "));
   }
   return found.best.end == control::SearchEnd::converged ? 0 : kNotConverged;
 }

@@ -230,6 +230,23 @@ TEST_F(RunTools, IdentifyDistinguishesARobotThatRanLateFromLostSamples) {
   EXPECT_NE(ask("identify --run 1 --from-s 1.3 --to-s 3.81 --structure first_order").exit_code, 1);
 }
 
+// Of each 20 periods one more is skipped at first, 4.8 %, and two in the last third: 6.1 % in all.
+TEST_F(RunTools, MoreSkippedPeriodsThanTolerableCostTheEndOfTheRunOnly) {
+  begin();
+  for (int part = 0; part < 60; ++part) {
+    swim(20, part % 2 == 0 ? 0.3 : -0.2);
+    robot_.late_us += part < 40 ? 10'000 : 20'000;
+  }
+  flush();
+  const ToolAnswer refused = ask("identify --run 1 --structure first_order");
+  EXPECT_EQ(refused.exit_code, 1);
+  EXPECT_THAT(refused.error, HasSubstr("the robot skipped "));
+  EXPECT_THAT(refused.error, HasSubstr(" periods, more than 5 %; choose --from-s 0 --to-s "));
+  const ToolAnswer answer = ask("identify --run 1 --structure first_order --cut-at-gaps");
+  EXPECT_NE(answer.exit_code, 1) << answer.error;
+  EXPECT_THAT(answer.error, HasSubstr("fitted is the longest part with fewer that begins at rest, from 0.000 to "));
+}
+
 // The longer part begins under way, where the model is not at rest.
 TEST_F(RunTools, CutAtGapsTakesTheLongestPartThatBeginsAtRest) {
   begin();
