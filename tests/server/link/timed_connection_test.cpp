@@ -24,7 +24,9 @@ TEST_F(TimedConnectionTest, AreDroppedOverTheConnectionThatReplacesTheOneOfTheDr
   control(station::ControlAction::force, "b");
   ASSERT_EQ(drops(), 1U);
   dial_again();
-  ASSERT_EQ(kinds(), std::vector<const char*>{"drop_timed"}) << "ahead of whatever b commands";
+  const auto sent = kinds();
+  const std::vector<std::string> names{sent.begin(), sent.end()};  // not addresses
+  ASSERT_EQ(names, std::vector<std::string>{"drop_timed"}) << "ahead of whatever b commands";
 }
 
 TEST_F(TimedConnectionTest, WhatWasSentOverAReplacedConnectionHasNoAnswer) {
