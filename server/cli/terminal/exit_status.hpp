@@ -23,7 +23,9 @@ inline constexpr ExitStatus kExitStatuses[] = {
     {3,
      "tune, autotune: no controller meets the specification; estimator: the robot cannot use a model of this plant; "
      "profile: a predicted run leaves the limits"},
-    {4, "identify: the search did not converge, or its result is not finite; the best result is printed"},
+    {4,
+     "identify: the search did not converge, its result is not finite, or the model explains less than 1 % of every "
+     "run; the best result is printed"},
     {5,
      "not confirmed, or it did not end well: stop: a robot has not confirmed; robot parameters, robot controller: "
      "accepted, but not reported back; job, experiment: failed, cancelled, aborted or interrupted; autotune: a stage "
