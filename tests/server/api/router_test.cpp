@@ -75,7 +75,7 @@ TEST_F(RouterTest, AnswersUnknownPathsAndMethods) {
 
 TEST_F(RouterTest, RefusesPathsThatHideSomething) {
   for (const char* target : {"/api/v1/../v1/runs", "/..", "/a/%2e%2e/b", "/a%2fb", "/a%5cb", "/a%00", "/%", "/%4",
-                             "api/v1/runs", "", "http://host/api/v1/runs", "*"}) {
+                             "api/v1/runs", "", "ftp://host/api/v1/runs", "http://user@host/api/v1/runs", "*"}) {
     EXPECT_EQ(status(target), 400) << target;
   }
 }
