@@ -100,7 +100,7 @@ void knock(const std::string& text) {
   }
   const std::string authorization = request.header("authorization");
   const bool by_token = authorization.size() == 7 + house.token.size() && authorization.ends_with(house.token);
-  const bool by_cookie = authorization.empty() && (own == house.session || old == house.session);
+  const bool by_cookie = authorization.empty() && own == house.session;
   require(by_token || by_cookie);
   const bool changes = request.method != "GET" && request.method != "HEAD" && request.method != "OPTIONS";
   const bool says_where = !request.header("origin").empty() || request.header("sec-fetch-site") == "same-origin";
