@@ -50,7 +50,7 @@ std::string channels_reason(double largest_position_sd_m);
 // velocity are the robot's estimates, and the recording holds the acceleration in their place. Else position_m is what
 // was measured: without the disturbance, which the robot adds to it. Periods that the robot skipped, a few, are missed
 // ticks of the recording (control/search/missed_ticks.hpp), with a warning. invalid: several spans to choose from, too
-// few samples, or gaps or missing values; the detail names each (samples that were lost told from periods that the
+// few samples, or gaps or missing values; the detail names each (samples that were lost, apart from periods that the
 // robot skipped) and the longest windows without one, as flags.
 Result<RunRecording> recording_of(std::span<const storage::StoredSample> samples, const RunWindow& window,
                                   const storage::StoredReference* reference = nullptr,

@@ -542,7 +542,7 @@ end:
 #define is_free (served != 0 && empty(queue) && commands < COMMANDS && (!drop_due || !DROP_COMES_FIRST))
 #define may_command(me) (holder == me || (holder == 0 && tenure < TENURES) || (!ONE_IN_CONTROL && tenure > 0))
 
-/* Whoever commands a robot that nobody controls takes control. */
+/* A command to a robot that nobody controls takes control. */
 inline take_control(me) {
   if
   :: holder == 0 -> tenure++; holder = me; my_tenure = tenure; station_does(CONTROL, me)

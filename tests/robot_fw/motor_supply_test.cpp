@@ -34,7 +34,7 @@ TEST_F(MotorSupply, ThatIsCutStopsTheRobotInTheSameTickWithACauseOfItsOwn) {
   EXPECT_STREQ(protocol::text(core.events.back().cause), "motor_supply");
 }
 
-// SAFETY: whoever lets the button go starts nothing.
+// SAFETY: releasing the button starts nothing.
 TEST_F(MotorSupply, ThatComesBackMovesNothing) {
   core.order(sim_robot::set_auto(0.5F));
   core.run(5);

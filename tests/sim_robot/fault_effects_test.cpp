@@ -1,5 +1,5 @@
 // The faults of link and robot by time line, in virtual time: what the robot makes of them, and how they end.
-// LONG: one test for each fault, told in the words of one fixture.
+// LONG: one test for each fault, written in the words of one fixture.
 #include <gmock/gmock.h>
 
 #include "sim_robot/lab/lab.hpp"

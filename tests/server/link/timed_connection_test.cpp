@@ -47,7 +47,7 @@ class RestartedStationTest : public LinkTest {
   }
 };
 
-// The model finds it (DROP_AFTER_RESTART): whoever commands next would renew the lease of what somebody else left.
+// The model finds it (DROP_AFTER_RESTART): the next to command would renew the lease of what somebody else left.
 TEST_F(RestartedStationTest, DropsWhatAnEarlierRunMayHaveLeftOnTheRobot) { EXPECT_EQ(drops_after(77), 1U); }
 
 TEST_F(RestartedStationTest, DropsNothingOfABootThatItHasNotSeenBefore) { EXPECT_EQ(drops_after(76), 0U); }
