@@ -162,7 +162,7 @@ def reached(root, changed):
     if any(LX106.match(path) for path in changed):
         lines |= {"lx106", "test esp8266_check"}
     if any(DOCUMENT.match(path) for path in changed):
-        lines |= {"test site", "test docs_commands"}
+        lines |= {"test site", "test docs_commands", "test docs_not_yet"}
     if any(path.startswith("tests/data/") and not is_named(tree, path) for path in changed):
         lines |= {f"program {program}" for program in tree.programs}
     return sorted(lines)
