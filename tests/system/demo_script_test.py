@@ -212,6 +212,18 @@ class DemoScriptTest(unittest.TestCase):
                 wait_until(lambda: not self.running(), WAIT_S, f"the end of all: {self.running()}")
                 self.go_on(step)
 
+    def test_a_second_signal_breaks_off_no_ending(self):
+        demo = self.on_a_terminal()
+        demo.wait_for("press Enter to begin. ")
+        station = self.station().endpoints["pid"]
+        os.kill(station, signal.SIGSTOP)
+        demo.press(b"\x03")
+        wait_until(lambda: set(self.running()) == {demo.process.pid, station}, WAIT_S, "the end of the robot")
+        demo.process.send_signal(signal.SIGTERM)
+        os.kill(station, signal.SIGCONT)
+        self.assertEqual(130, demo.end(), demo.text)
+        self.assertEqual([], self.running())
+
     def test_sigterm_ends_a_build(self):
         self.let("build.stops")
         demo = self.without_a_terminal()
