@@ -8,11 +8,23 @@ import unittest
 
 ROOT = pathlib.Path(__file__).resolve().parents[1]
 COMPILER = """#!/bin/sh
+case "$(basename "$0") $*" in
+  *objdump*) cat "$DISASSEMBLY"; exit ;;
+esac
 case "$*" in
   --version) echo "xtensa-lx106-elf-g++ 10.3" ;;
   "-E -x c -") grep -q pgmspace ;;
   *) echo "$*" >>"$COMPILED" ;;
 esac
+"""
+
+
+IN_RAM = """Disassembly of section .iram.text.motor.cpp.25.10:
+0000000c <_ZN12_GLOBAL__N_19drive_pinEv>:
+   c: rsr.ccount a4
+Disassembly of section .text._ZN5MotorE:
+00000000 <_ZN5MotorE>:
+  3d: callx0 a0
 """
 
 
@@ -22,18 +34,20 @@ class Esp8266CheckTest(unittest.TestCase):
         self.core = self.folder / "core"
         self.core.mkdir()
         (self.core / "platform.txt").write_text("name=ESP8266 Boards\nversion=3.1.2\n")
+        self.disassembly = self.folder / "disassembly"
+        self.disassembly.write_text(IN_RAM)
 
     def put_compiler(self, text=COMPILER):
         tools = self.core / "tools/xtensa-lx106-elf/bin"
         tools.mkdir(parents=True)
-        for name in ("g++", "gcc"):
+        for name in ("g++", "gcc", "objdump"):
             compiler = tools / f"xtensa-lx106-elf-{name}"
             compiler.write_text(text)
             compiler.chmod(0o755)
 
     def check(self):
         environment = {**os.environ, "PATH": "/usr/bin:/bin", "ESP8266_ARDUINO_DIR": str(self.core),
-                       "COMPILED": str(self.folder / "compiled")}
+                       "COMPILED": str(self.folder / "compiled"), "DISASSEMBLY": str(self.disassembly)}
         return subprocess.run([ROOT / "deploy/esp8266-check"], env=environment, capture_output=True, text=True, timeout=120)
 
     def test_the_cores_own_compiler_and_library(self):
@@ -50,6 +64,16 @@ class Esp8266CheckTest(unittest.TestCase):
         done = self.check()
         self.assertNotEqual(0, done.returncode)
         self.assertNotIn("compiled against", done.stdout)
+
+    def test_the_motors_interrupt_lies_in_ram_and_calls_nothing(self):
+        self.put_compiler()
+        for disassembly, fault in ((IN_RAM.replace(".iram.text", ".text"), "does not lie in RAM"),
+                                   (IN_RAM.replace("rsr.ccount", "callx0"), "calls a function"),
+                                   (IN_RAM.replace("rsr.ccount", "call0"), "calls a function")):
+            self.disassembly.write_text(disassembly)
+            done = self.check()
+            self.assertEqual(1, done.returncode, done.stdout)
+            self.assertIn(fault, done.stderr)
 
     def test_a_folder_that_is_no_core(self):
         (self.core / "platform.txt").unlink()

@@ -195,6 +195,15 @@ class DemoScriptTest(unittest.TestCase):
         self.assertNotIn("press Enter", demo.text)
         self.assertEqual([], self.running())
 
+    def test_section_5_begins_with_a_key_and_ends(self):
+        (self.folder / "deploy/paper_demo.py").write_text("print('Section 5 is performed')\n")
+        demo = self.on_a_terminal("--paper")
+        demo.wait_for("press Enter to begin. ")
+        demo.press(b"\n")
+        self.assertEqual(0, demo.end(), demo.text)
+        self.in_order(demo.text, "4 experiments", "6 minutes", "page: http://", "press Enter", "Section 5 is performed")
+        self.assertEqual([], self.running())
+
     def test_ctrl_c_at_each_step_ends_everything(self):
         self.experiment_that("import time\nprint('an experiment', flush=True)\ntime.sleep(1000)\n")
         for step, words in (("apt", "Setting up zsh"), ("build", "1 of 4"), ("key", "press Enter to begin. "),
@@ -247,7 +256,8 @@ class DemoScriptTest(unittest.TestCase):
     def test_a_first_build_that_fails_shows_the_end_of_its_log(self):
         (self.folder / "build/release/bin").unlink()
         self.let("build.fails")
-        for demo in (self.on_a_terminal(), self.without_a_terminal()):
+        for start in (self.on_a_terminal, self.without_a_terminal):
+            demo = start()
             self.assertEqual(1, demo.end(), demo.text)
             self.in_order(demo.text, "8 to 25 minutes", "failed after", f"The end of {self.log}", "two.cpp:1: error: no",
                           f"all that it printed is in {self.log}")
