@@ -22,7 +22,7 @@ CPP = (".cpp", ".hpp", ".h", ".ino")
 EVERYTHING = re.compile(r"(CMakeLists\.txt|CMakePresets\.json|cmake/.*|tests/CMakeLists\.txt|deploy/(build|packages|test|"
                         r"reach\.py)|\.ci/.*)$")
 CHECKS = ("rules", "rules_test", "rooms", "docs", "docs_test", "docs_messages", "format", "reach_test",
-          "tidy_test")  # seconds; after every change
+          "tidy_test", "esp8266_check_test")  # seconds; after every change
 LX106 = re.compile(r"(robot_fw|protocol|sim_robot/(world|robot|network|faults|scenario|lab)|control/models|tests/lx106)/|"
                    r"deploy/(lx106|esp8266)")
 DOCUMENT = re.compile(r"[^/]*\.md$|docs/|site/|tests/site/|deploy/(site|npm-packages)$")
@@ -162,7 +162,7 @@ def reached(root, changed):
     if any(LX106.match(path) for path in changed):
         lines |= {"lx106", "test esp8266_check"}
     if any(DOCUMENT.match(path) for path in changed):
-        lines |= {"test site", "test docs_commands"}
+        lines |= {"test site", "test docs_commands", "test docs_not_yet"}
     if any(path.startswith("tests/data/") and not is_named(tree, path) for path in changed):
         lines |= {f"program {program}" for program in tree.programs}
     return sorted(lines)

@@ -2,10 +2,16 @@
 #include "robot_fw/esp8266/board.hpp"
 
 #include <Arduino.h>
+#include <core_version.h>
 #include <user_interface.h>
 
 #include "robot_fw/esp8266/instruction_ram.hpp"
 #include "robot_fw/esp8266/reset_cause.hpp"
+
+// SAFETY: that no write waits and that the dead-man interrupt runs was read in the source of this version alone.
+static_assert(
+    ARDUINO_ESP8266_MAJOR == 3 && ARDUINO_ESP8266_MINOR == 1 && ARDUINO_ESP8266_REVISION == 2,
+    "made for Arduino core 3.1.2 (docs/hardware.md, Flashing); read TlsStream and Motor beside another one first");
 
 namespace robot_fw::esp8266 {
 namespace {

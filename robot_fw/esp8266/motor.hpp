@@ -14,7 +14,7 @@
 
 namespace robot_fw::esp8266 {
 
-constexpr std::uint32_t kDeadManUs = 50'000;
+constexpr std::uint32_t kDeadManUs = 50'000;  // in cycles at F_CPU: twice as long while the SDK runs the chip at 80 MHz
 
 // The share of time for which the pin is high, in [0, 1]; 0 for what is not a number.
 float pwm_share(float duty, float dead_zone);
