@@ -26,6 +26,9 @@ CHECKS = ("rules", "rules_test", "rooms", "docs", "docs_test", "docs_messages", 
 LX106 = re.compile(r"(robot_fw|protocol|sim_robot/(world|robot|network|faults|scenario|lab)|control/models|tests/lx106)/|"
                    r"deploy/(lx106|esp8266)")
 DOCUMENT = re.compile(r"[^/]*\.md$|docs/|site/|tests/site/|deploy/(site|npm-packages)$")
+# What the documents are compared with.
+COMMANDS = re.compile(r"(server|sim_robot)/cli/")
+INTERFACE = re.compile(r"server/api/openapi\.yaml$|protocol/|" + COMMANDS.pattern)
 BROWSER_ROOM = "server/api/routes"  # embeds the page and openapi.yaml
 
 
@@ -163,6 +166,10 @@ def reached(root, changed):
         lines |= {"lx106", "test esp8266_check"}
     if any(DOCUMENT.match(path) for path in changed):
         lines |= {"test site", "test docs_commands", "test docs_not_yet"}
+    if any(COMMANDS.match(path) for path in changed):
+        lines.add("test docs_commands")
+    if any(INTERFACE.match(path) for path in changed):
+        lines.add("test docs_not_yet")
     if any(path.startswith("tests/data/") and not is_named(tree, path) for path in changed):
         lines |= {f"program {program}" for program in tree.programs}
     return sorted(lines)

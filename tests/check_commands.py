@@ -21,16 +21,17 @@ NEVER_COMMANDS = re.compile(r"^(CHANGELOG\.md|docs/decisions/)")  # they speak o
 
 @functools.cache
 def help_of(words):
-    """(subcommands, options) that `program … --help` lists."""
+    """(subcommands, options) that `program … --help` lists; its arguments are neither."""
     done = subprocess.run([str(pathlib.Path(os.environ["RHEONAUT_BIN"]) / words[0]), *words[1:], "--help"],
                           capture_output=True, text=True, timeout=60)
-    subcommands = set(re.findall(r"^  ([a-z][a-z0-9-]*)(?: {2,}\S|$)", done.stdout, re.M))
-    return subcommands, set(re.findall(r"(?<![\w-])--?[a-z][a-z0-9-]*", done.stdout)) | {"--help", "--version"}
+    text = re.sub(r"^Arguments:\n(  .*\n)*", "", done.stdout, flags=re.M)
+    subcommands = set(re.findall(r"^  ([a-z][a-z0-9-]*)(?: {2,}\S|$)", text, re.M))
+    return subcommands, set(re.findall(r"(?<![\w-])--?[a-z][a-z0-9-]*", text)) | {"--help", "--version"}
 
 
 def fault_of_program(words):
     path, options = (words[0],), set()
-    for word in words[1:]:
+    for before, word in zip(words, words[1:]):
         if "…" in word:  # what stands there may have options of its own
             return None
         subcommands, known = help_of(path)
@@ -42,8 +43,8 @@ def fault_of_program(words):
         elif word in subcommands:
             path += (word,)
             options |= help_of(path)[1]
-        elif path == ("rheonaut",) and re.fullmatch(r"[a-z][a-z-]*", word):
-            return f"rheonaut has no command {word}"
+        elif subcommands and not before.startswith("-") and re.fullmatch(r"[a-z][a-z-]*", word):
+            return f"{' '.join(path)} has no command {word}"
     return None
 
 

@@ -9,7 +9,7 @@ import check_commands
 
 PROGRAM = """#!/bin/sh
 case "$*" in
-  "user add --help") echo "  --role TEXT REQUIRED   viewer or operator"; echo "  -f,--force" ;;
+  "user add --help") printf 'Arguments:\\n  name  The user\\n\\n'; echo "  --role TEXT REQUIRED   viewer or operator"; echo "  -f,--force" ;;
   "user --help") echo "Subcommands:"; echo "  add        Add one" ;;
   *) echo "Options:"; echo "  --version   Print it"; echo "Subcommands:"; echo "  user       Users" ;;
 esac
@@ -32,13 +32,15 @@ def found(document):
 class CheckCommands(unittest.TestCase):
     def test_commands_that_parse(self):
         for line in ("rheonaut user add anna --role viewer -f", "X=1 build/release/bin/rheonaut user add a > b.json",
-                     "cat a | rheonaut user --help", "deploy/demo --once   # --twice", "rheonaut user add \\\n  --role a",
+                     "cat a | rheonaut user --help", "rheonaut-sim --version water",  "deploy/demo --once   # --twice", "rheonaut user add \\\n  --role a",
                      "curl --no-such rheonaut"):
             self.assertEqual(found(f"```sh\n{line}\n```\n"), [], line)
         self.assertEqual(found("```json\nrheonaut --no\n```\n```cpp a.cpp\nrheonaut --no\n```\n"), [])
 
     def test_commands_that_do_not(self):
         for line, fault in (("rheonaut usr add anna", "rheonaut has no command usr"),
+                            ("rheonaut user remove anna", "rheonaut user has no command remove"),
+                            ("rheonaut-sim pause", "rheonaut-sim has no command pause"),
                             ("a && rheonaut user add anna --rule viewer", "rheonaut user add has no option --rule"),
                             ("$(rheonaut-sim --statoin x)", "rheonaut-sim has no option --statoin"),
                             ("deploy/demo --twice", "deploy/demo has no option --twice"),

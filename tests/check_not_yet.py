@@ -3,8 +3,8 @@
 
 A list begins with a heading "Not yet" and ends with the next heading, or is a paragraph that begins with "Not yet". What
 stands there in backquotes must be missing: a route (`GET /api/v1/robots`) in openapi.yaml, a command (`rheonaut stop`)
-or option (`--once`) in the programs' own --help, a word (`supply_mv`) among the fields and values of robot.proto and the
-members of openapi.yaml. What exists is named there without backquotes. And docs/security.md, whose rows name a test each,
+or option (`--once`) in the programs' own --help, a word (`supply_mv`) among the fields and values of robot.proto (with
+or without the name of their enum) and the members and values of openapi.yaml. What exists is named there without backquotes. And docs/security.md, whose rows name a test each,
 may not say of one that it has not been run. The programs are in RHEONAUT_BIN. Prints `file:line: what is wrong`.
 """
 import pathlib
@@ -38,14 +38,29 @@ def commands(path):
     """The command and all below it, each as a tuple of its words."""
     yield path
     for word in sorted(help_of(path)[0]):
-        below = path + (word,)
-        # An argument is refused, which prints no -h, or ignored: then the help is that of the command.
-        if "-h" in help_of(below)[1] and help_of(below) != help_of(path):
-            yield from commands(below)
+        yield from commands(path + (word,))
 
 
 def all_commands():
     return [words for program in PROGRAMS for words in commands((program,))]
+
+
+def words_of_proto(proto):
+    """The fields and values; the values as the documents write them, too: MODE_AUTO of the enum Mode is auto."""
+    found = set(re.findall(r"(\w+) = \d+", proto))
+    for enum, body in re.findall(r"^enum (\w+) \{(.*?)^\}", proto, re.M | re.S):
+        prefix = re.sub(r"\B(?=[A-Z])", "_", enum).upper() + "_"
+        found |= {value.removeprefix(prefix).lower() for value in re.findall(r"(\w+) = \d+", body)}
+    return found
+
+
+def words_of_openapi(openapi):
+    """The members, which stand below `properties:`, and the values of each `enum:`."""
+    found = set(re.findall(r"\w+", " ".join(re.findall(r"\benum: \[([^\]]*)\]", openapi))))
+    for start in re.finditer(r"^( +)properties:\n", openapi, re.M):
+        block = re.match(rf"(?:{start[1]} .*\n|\n)*", openapi[start.end():])[0]
+        found |= set(re.findall(rf"^{start[1]}  (\w+):", block, re.M))
+    return found
 
 
 def is_there(name, openapi, proto):
@@ -62,10 +77,10 @@ def is_there(name, openapi, proto):
         found = next((words for words in all_commands() if name in help_of(words)[1]), None)
         return found and f"an option of {' '.join(found)}"
     elif re.fullmatch(r"\w+", name):
-        if re.search(rf"^\s*(?:[\w.]+ )*{name} = \d+", proto, re.M | re.I):
+        if name in words_of_proto(proto):
             return "a field or value of robot.proto"
-        if re.search(rf"(?:^ +|\{{ ){name}:", openapi, re.M):
-            return "a member of openapi.yaml"
+        if name in words_of_openapi(openapi):
+            return "a member or value of openapi.yaml"
         if any(name in words[1:] for words in all_commands()):
             return "a command"
     return None

@@ -10,7 +10,7 @@ import check_not_yet
 
 PROGRAM = """#!/bin/sh
 case "$*" in
-  "user add --help") echo "  -h,--help   Print"; echo "  --role TEXT REQUIRED   viewer or operator" ;;
+  "user add --help") printf 'Arguments:\\n  name  The user\\n\\n  -h,--help   Print\\n'; echo "  --role TEXT REQUIRED   viewer or operator" ;;
   "user --help") echo "  -h,--help   Print"; echo "  add        Add one" ;;
   "--help") echo "  -h,--help   Print"; echo "  user       Users" ;;
 esac
@@ -21,9 +21,24 @@ OPENAPI = """paths:
       summary: One
 components:
   schemas:
-    Robot: { supply_mv: { type: number } }
+    Robot:
+      description: One
+      properties:
+        supply_mv: { type: number, default: 0 }
+        sample:
+          type: object
+          properties:
+            cause: { enum: [worn_out, wet,
+                            dry] }
 """
-PROTO = "message Status {\n  optional float motor_current_a = 3;\n}\nenum Cause {\n  CAUSE_SWITCH = 1;\n}\n"
+PROTO = """message Status {
+  optional float motor_current_a = 3;
+}
+enum StopCause {
+  STOP_CAUSE_NONE = 0;  // {}
+  STOP_CAUSE_MAIN_SWITCH = 1;
+}
+"""
 
 
 def found(text, document="CHANGELOG.md"):
@@ -43,15 +58,21 @@ def found(text, document="CHANGELOG.md"):
 class CheckNotYet(unittest.TestCase):
     def test_what_is_missing_may_be_named(self):
         self.assertEqual([], found("### Not yet\n\n`GET /api/v1/pumps`, `POST /api/v1/robots/{id}`, `rheonaut usr`,\n"
-                                   "`rheonaut user add --age`, `--twice`, `supply_w`, `PostgreSQL`\n"))
+                                   "`rheonaut user add --age`, `--twice`, `supply_w`, `PostgreSQL`,\n"
+                                   "`rheonaut user remove`, `rheonaut-sim pause`, `rheonaut-sim --seed 3 user remove`,\n"
+                                   "`type`, `description`, `default`, `get`, `name`, `switch`, `current_a`, `Robot`\n"))
 
     def test_what_exists_may_not(self):
         for name, what in (("GET /api/v1/robots/<id>", "a route of openapi.yaml"),
                            ("/api/v1/robots/{robot_id}", "a route of openapi.yaml"),
                            ("rheonaut user add --role", "a command"), ("user", "a command"),
-                           ("--role", "an option of rheonaut user add"), ("supply_mv", "a member of openapi.yaml"),
+                           ("--role", "an option of rheonaut user add"), ("supply_mv", "a member or value of openapi.yaml"),
+                           ("sample", "a member or value of openapi.yaml"), ("cause", "a member or value of openapi.yaml"),
+                           ("worn_out", "a member or value of openapi.yaml"), ("dry", "a member or value of openapi.yaml"),
+                           ("rheonaut user add anna", "a command"), ("rheonaut-sim --help water", "a command"),
                            ("motor_current_a", "a field or value of robot.proto"),
-                           ("cause_switch", "a field or value of robot.proto")):
+                           ("main_switch", "a field or value of robot.proto"),
+                           ("STOP_CAUSE_MAIN_SWITCH", "a field or value of robot.proto")):
             self.assertEqual([f"CHANGELOG.md:2: {name} is not missing: it is {what}"], found(f"## Not yet\nnot `{name}`\n"))
 
     def test_which_lines_are_a_list(self):

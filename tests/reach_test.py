@@ -65,7 +65,7 @@ class ReachTest(unittest.TestCase):
                     {"program world_test", "test rheonaut_sim_.*", "lx106", "test esp8266_check"} | PROCESSES)
 
     def test_what_all_stand_on_reaches_all_that_include_it(self):
-        self.expect("protocol/robot.proto", {"program net_test", "program page_test", "program frame_fuzz_replay", "lx106",
+        self.expect("protocol/robot.proto", {"test docs_not_yet", "program net_test", "program page_test", "program frame_fuzz_replay", "lx106",
                                              "test esp8266_check", "test golden_frames_by_protoc"} | PROCESSES)
 
     def test_a_test_reaches_itself_and_its_words_all_that_use_them(self):
@@ -79,6 +79,11 @@ class ReachTest(unittest.TestCase):
         self.expect("tests/data/listener_cases.json", {"program net_test"})
         self.expect("tests/data/fuzz/frame/1", {"program frame_fuzz_replay"})
 
+    def test_what_the_documents_are_compared_with_reaches_their_checks(self):
+        for path in ("server/cli/user.cpp", "sim_robot/cli/options.hpp", "server/api/openapi.yaml", "protocol/robot.proto"):
+            self.assertIn("test docs_not_yet", reach.reached(self.root, [path]), path)
+            self.assertEqual("/cli/" in path, "test docs_commands" in reach.reached(self.root, [path]), path)
+
     def test_data_that_nobody_names_reaches_every_program(self):
         self.expect("tests/data/new.json", {"program net_test", "program page_test", "program world_test",
                                             "program frame_fuzz_replay"})
@@ -91,7 +96,7 @@ class ReachTest(unittest.TestCase):
     def test_the_page_reaches_its_own_tests_and_the_browsers(self):
         self.expect("web/src/api.ts", {"test web", "test browser_escape"})
         self.expect("web/tests/api_test.ts", {"test web"})
-        self.expect("server/api/openapi.yaml", {"test web", "program page_test"} | PROCESSES)
+        self.expect("server/api/openapi.yaml", {"test web", "test docs_not_yet", "program page_test"} | PROCESSES)
 
     def test_what_decides_how_it_is_built_reaches_everything(self):
         for path in ("CMakeLists.txt", "cmake/rooms.cmake", "tests/CMakeLists.txt", "deploy/test", ".ci/run"):
