@@ -22,7 +22,7 @@ CPP = (".cpp", ".hpp", ".h", ".ino")
 EVERYTHING = re.compile(r"(CMakeLists\.txt|CMakePresets\.json|cmake/.*|tests/CMakeLists\.txt|deploy/(build|packages|test|"
                         r"reach\.py)|\.ci/.*)$")
 CHECKS = ("rules", "rules_test", "rooms", "docs", "docs_test", "docs_messages", "format", "reach_test",
-          "tidy_test", "esp8266_check_test")  # seconds; after every change
+          "tidy_test", "arm64_test", "esp8266_check_test")  # seconds; after every change
 LX106 = re.compile(r"(robot_fw|protocol|sim_robot/(world|robot|network|faults|scenario|lab)|control/models|tests/lx106)/|"
                    r"deploy/(lx106|esp8266)")
 DOCUMENT = re.compile(r"[^/]*\.md$|docs/|site/|tests/site/|deploy/(site|npm-packages)$")
