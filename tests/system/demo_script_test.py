@@ -22,7 +22,10 @@ WAIT_S = 100
 STAND_IN = """#!/bin/sh
 echo "$(basename "$0") $*" >>"$STAND_INS/calls"
 case "$(basename "$0") $*" in
+  "sudo -n"*) [ ! -e "$STAND_INS/sudo.asks-each-time" ]; exit ;;
+  sudo*apt-get*) trap "" TERM; "$@"; exit ;;  # no signal of a user reaches what belongs to root
   sudo*) exec "$@" ;;
+  "id -u") echo 1000; exit ;;
   dpkg-query*zsh*) [ -e "$STAND_INS/installed" ] && echo "install ok installed"; exit 0 ;;
   dpkg-query*) echo "install ok installed"; exit 0 ;;
   apt-get*install*) echo "Setting up zsh"; touch "$STAND_INS/installed"; stops_at=apt ;;
@@ -82,7 +85,7 @@ class DemoScriptTest(unittest.TestCase):
         self.stand_ins = self.folder / "stand-ins"
         self.stand_ins.mkdir()
         (self.stand_ins / "installed").touch()
-        for name in ("cmake", "apt-get", "dpkg-query", "sudo"):
+        for name in ("cmake", "apt-get", "dpkg-query", "sudo", "id"):
             (self.stand_ins / name).write_text(STAND_IN)
             (self.stand_ins / name).chmod(0o755)
         self.log = self.folder / "build/demo.log"
@@ -141,6 +144,15 @@ class DemoScriptTest(unittest.TestCase):
         for word in words:
             self.assertIn(word, text[place:], f"{words} in:\n{text}")
             place = text.index(word, place) + len(word)
+
+    def programs(self, station):
+        """In place of the real station, a shell script."""
+        folder = self.folder / "build/release/bin"
+        folder.unlink()
+        folder.mkdir()
+        (folder / "rheonaut").write_text("#!/bin/sh\n" + station)
+        (folder / "rheonaut").chmod(0o755)
+        (folder / "rheonaut-sim").symlink_to(BIN / "rheonaut-sim")
 
     def experiment_that(self, does):
         """In place of the real one, which takes 45 s and has tests of its own."""
@@ -220,6 +232,75 @@ class DemoScriptTest(unittest.TestCase):
                 self.assertEqual(130, demo.end(), demo.text)
                 wait_until(lambda: not self.running(), WAIT_S, f"the end of all: {self.running()}")
                 self.go_on(step)
+
+    def test_sigterm_ends_an_experiment_in_its_midst(self):
+        for name, arguments in (("experiment", ["--once"]), ("paper_demo", ["--paper"])):
+            with self.subTest(name):
+                (self.folder / f"deploy/{name}.py").write_text(
+                    "import subprocess\nsubprocess.run(['sh', '-c', 'echo an experiment; sleep 1000; echo'])\n")
+                demo = self.without_a_terminal(*arguments)
+                demo.wait_for("an experiment")
+                demo.process.send_signal(signal.SIGTERM)
+                self.assertEqual(143, demo.end(), demo.text)
+                self.assertEqual([], self.running())
+
+    def test_ctrl_d_begins_nothing(self):
+        self.experiment_that("print('an experiment')\n")
+        demo = self.on_a_terminal()
+        demo.wait_for("press Enter to begin. ")
+        demo.press(b"\x04")
+        os.kill(self.station().endpoints["pid"], signal.SIGKILL)  # which it looks at only as long as it waits for the key
+        self.assertEqual(1, demo.end(), demo.text)
+        self.assertIn("demo: the station has ended", demo.text)
+        self.assertNotIn("4 experiment\n", demo.text)
+
+    def test_a_station_that_does_not_start_is_named(self):
+        self.programs(station="echo 'reading the disk'; exec sleep 1000\n")
+        demo = self.without_a_terminal()
+        self.assertEqual(1, demo.end(), demo.text)
+        self.in_order(demo.text, "reading the disk", "demo: the station did not start within 15 s")
+        self.assertNotIn("Traceback", demo.text)
+        self.assertEqual([], self.running())
+
+    def test_a_page_without_a_link_begins_no_experiment(self):
+        self.experiment_that("print('an experiment')\n")
+        self.programs(station="""echo secret >"$3/rheonaut.token"
+echo '{"http": "127.0.0.1:1", "robots": "127.0.0.1:1"}' >"$3/endpoints.json"
+exec sleep 1000
+""")
+        demo = self.without_a_terminal()
+        self.assertEqual(1, demo.end(), demo.text)
+        self.assertIn("demo: the station gave no link to its page: ", demo.text)
+        self.assertNotIn("an experiment", demo.text)
+        self.assertEqual([], self.running())
+
+    def test_a_station_that_hangs_is_killed(self):
+        demo = self.on_a_terminal()
+        demo.wait_for("press Enter to begin. ")
+        os.kill(self.station().endpoints["pid"], signal.SIGSTOP)
+        demo.press(b"\x03")
+        self.assertEqual(130, demo.end(), demo.text)
+        self.assertEqual([], self.running())
+
+    def test_apt_that_no_signal_reaches_is_named_and_left(self):
+        (self.stand_ins / "installed").unlink()
+        self.let("apt.stops")
+        demo = self.without_a_terminal()
+        wait_until(lambda: "Setting up" in self.log.read_text() if self.log.exists() else False, WAIT_S, "apt")
+        demo.process.send_signal(signal.SIGTERM)
+        self.assertEqual(143, demo.end(), demo.text)
+        self.in_order(demo.text, "demo: sudo (process ", ") did not end and goes on\n", "demo: apt-get (process ")
+        self.assertNotEqual([], self.running())
+        self.go_on("apt")
+        wait_until(lambda: not self.running(), WAIT_S, "the end of apt")
+
+    def test_a_sudo_that_asks_each_time_is_not_written_over(self):
+        (self.stand_ins / "installed").unlink()
+        self.let("sudo.asks-each-time", "build.fails")
+        demo = self.on_a_terminal()
+        self.assertEqual(1, demo.end(), demo.text)
+        self.in_order(demo.text, "sudo may ask for your password.", "Setting up zsh\n", "  2 build")
+        self.assertNotIn("\r  1 packages", demo.text)
 
     def test_a_second_signal_breaks_off_no_ending(self):
         demo = self.on_a_terminal()
