@@ -1,0 +1,178 @@
+"""examples/robot.py with a real station, in real time: driven, stopped and cleared; every sample there once after a cut link
+and after the station's death; a command that comes too late; TLS and a token."""
+import json
+import signal
+import subprocess
+import sys
+import time
+import unittest
+
+from example_robot import EXAMPLES  # first: it may go on in another Python
+
+from processes import ApiError, commanded, lab, wait_until
+from recording_audit import audit
+
+PATIENCE_S = 60  # far beyond what any step takes: the tests judge order and outcome
+
+
+class ExampleRobotTest(unittest.TestCase):
+    """With a real station, in real time."""
+
+    def started(self, config=None):
+        self.place = self.enterContext(lab(config=config))
+        self.station = self.place.start_station()
+        return self.station
+
+    def start_robot(self, address, *flags):
+        robot = self.place._start("cart-1", sys.executable, "-B", EXAMPLES / "robot.py", "--station", address, "--id",
+                                  "cart-1", *flags)
+        self.station.wait_for_robot("cart-1", PATIENCE_S)
+        return robot
+
+    def robot(self):
+        return self.station.robot("cart-1")
+
+    def verified(self, kind, **arguments):
+        """The station has seen the command's effect in the robot's telemetry."""
+        command_id = commanded(self.station, kind, "cart-1", **arguments)["command_id"]
+        return wait_until(lambda: self.state_of(command_id, "verified"), PATIENCE_S, f"{kind} verified")
+
+    def state_of(self, command_id, state):
+        record = self.station.get(f"/api/v1/commands/{command_id}")
+        return record if record["state"] == state else None
+
+    def more_samples(self, count=100):
+        seen = self.robot()["next_seq"]
+        wait_until(lambda: self.robot()["next_seq"] > seen + count, PATIENCE_S, f"{count} more samples")
+
+    def event(self, kind):
+        events = self.station.get("/api/v1/robots/cart-1/events?limit=1000")["events"]
+        return next((event for event in events if event["kind"] == kind), None)
+
+    def samples_from(self, first_seq, robot_time_us=0):
+        """Of the boot, from this number and this time on, to the latest."""
+        robot = self.robot()
+        span = {"boot_id": robot["boot_id"], "first_seq": first_seq, "last_seq": robot["next_seq"] - 1}
+        run = self.station.post("/api/v1/runs", {"robot_id": "cart-1", "name": "look", "span": span})["run_id"]
+        wait_until(lambda: self.station.get(f"/api/v1/runs/{run}/certificate")["final"], PATIENCE_S, "all of it on disk")
+        samples = self.station.get(f"/api/v1/runs/{run}/samples?limit=10000")["samples"]
+        self.assertEqual([sample["seq"] for sample in samples], list(range(first_seq, robot["next_seq"])))
+        return [sample for sample in samples if sample["robot_time_us"] >= robot_time_us]
+
+    def assert_nothing_moves(self, robot_time_us):
+        """From this time of the robot on, in each of more than 50 samples."""
+        self.more_samples(50)
+        duties = [sample["duty"] for sample in self.samples_from(0, robot_time_us)]
+        self.assertGreater(len(duties), 50)
+        self.assertEqual(set(duties), {0.0})
+
+    def assert_all_is_recorded(self):
+        """Every number of the one boot is there once. Ends the station."""
+        made = self.robot()["next_seq"]
+        wait_until(lambda: self.robot()["durable_next_seq"] >= made, PATIENCE_S, "what was made until now is on disk")
+        self.assertEqual(self.place.stop_station(), 0)
+        faults, stored, lost = audit(self.place.data / "station.sqlite")
+        self.assertEqual((faults, lost), ([], 0))
+        self.assertGreaterEqual(stored, made)
+
+    def test_it_is_driven_stopped_and_cleared(self):
+        station = self.started()
+        robot = self.start_robot(station.endpoints["robots"])
+        self.assertIsNone(self.robot()["sample"]["impedance_mv"], "it has no such sensor")
+        wait_until(lambda: self.robot()["stop_path"]["is_open"], PATIENCE_S, "the way of a stop is open")
+
+        self.verified("set_duty", duty=0.4)
+        lapsed = wait_until(lambda: self.event("lease_lapsed"), PATIENCE_S, "the lease lapses")
+        self.assertAlmostEqual(lapsed["value"], 0.4, places=6)
+        self.assertGreater(self.robot()["sample"]["position_m"], 0.01)
+        self.assert_nothing_moves(lapsed["robot_time_us"])
+
+        self.verified("set_mode", mode="auto", setpoint_m=0.2)
+        wait_until(lambda: abs(self.robot()["sample"]["position_m"] - 0.2) < 0.002, PATIENCE_S, "it is there")
+        self.verified("set_setpoint", setpoint_m=-0.5)
+        wait_until(lambda: self.robot()["sample"]["velocity_m_s"] < -0.1, PATIENCE_S, "it moves")
+        stopped = station.post("/api/v1/robots/cart-1/emergency-stop")
+        wait_until(lambda: self.state_of(stopped["command_id"], "verified"), PATIENCE_S, "the stop is verified")
+        self.assertEqual(self.robot()["mode"], "emergency")
+        with self.assertRaises(ApiError) as refused:
+            station.command("cart-1", "set_duty", duty=0.1)
+        self.assertEqual(refused.exception.reason, "latched")
+        self.verified("clear_emergency", emergency_id=self.robot()["emergency_id"])
+        self.assertEqual((self.robot()["mode"], self.robot()["setpoint_m"]), ("manual", None))
+        self.assert_nothing_moves(stopped["effect_at_robot_us"])
+
+        with self.assertRaises(ApiError) as refused:
+            station.command("cart-1", "set_duty_schedule", schedule=[{"tick": 0, "duty": 0.1}, {"tick": 10, "duty": 0}])
+        self.assertEqual(refused.exception.reason, "unsupported")
+        station.command("cart-1", "zero_position")
+        wait_until(lambda: abs(self.robot()["sample"]["position_m"]) < 0.005, PATIENCE_S, "its place is the new 0")
+        self.assert_all_is_recorded()
+        robot.send_signal(signal.SIGTERM)
+        self.assertEqual(robot.wait(timeout=PATIENCE_S), 0, "it ends in order")
+
+    def test_a_command_that_comes_too_late_is_refused_and_moves_nothing(self):
+        station = self.started(config="[robots]\nlink_timeout_ms = 5000\n")
+        robot = self.start_robot(station.endpoints["robots"])
+        robot.send_signal(signal.SIGSTOP)  # what is sent to it now waits in its socket
+        try:
+            with self.assertRaises(ApiError) as unanswered:
+                station.command("cart-1", "set_duty", duty=0.5, life_ms=200)
+            self.assertEqual(unanswered.exception.status, 504)
+            command_id = station.get("/api/v1/robots/cart-1/commands?limit=1")["commands"][0]["command_id"]
+        finally:
+            robot.send_signal(signal.SIGCONT)
+        late = wait_until(lambda: self.state_of(command_id, "expired"), PATIENCE_S, "it is refused as expired")
+        self.assertEqual((late["reason"], late["effect_at_robot_us"]), ("expired", None))
+        self.assert_nothing_moves(0)
+
+    def test_after_a_cut_link_every_sample_is_there_once(self):
+        station = self.started()
+        proxy = subprocess.Popen([self.place.bin / "rheonaut-sim", "proxy", "--to", station.endpoints["robots"]],
+                                 stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, bufsize=1)
+        self.addCleanup(proxy.communicate)
+        self.addCleanup(proxy.terminate)
+        address = proxy.stdout.readline().split()[-1]
+        self.start_robot(address)
+        self.verified("set_mode", mode="auto", setpoint_m=1.0)
+        wait_until(lambda: self.robot()["sample"]["velocity_m_s"] > 0.1, PATIENCE_S, "it moves")
+        print("outage 3", file=proxy.stdin, flush=True)
+        wait_until(lambda: self.robot()["link"] == "disconnected", PATIENCE_S, "the link is cut")
+        wait_until(lambda: self.robot()["link"] == "connected", PATIENCE_S, "the robot has dialled again")
+        self.more_samples()
+        lost = wait_until(lambda: self.event("link_lost"), PATIENCE_S, "it noticed")
+        self.assertEqual((self.robot()["mode"], self.robot()["setpoint_m"]), ("manual", None))
+        self.assert_nothing_moves(lost["robot_time_us"])
+        flags = {sample["flags"] for sample in self.samples_from(0)}
+        self.assertTrue({flag for flag in flags if flag & 1 and flag & 4}, f"backfill of the time without link: {flags}")
+        self.assert_all_is_recorded()
+
+    def test_a_station_that_was_killed_misses_no_sample(self):
+        station = self.started()
+        ports = station.endpoints
+        self.start_robot(ports["robots"])
+        before = self.robot()
+        for _ in range(2):
+            self.more_samples()
+            self.place.kill_station()
+            time.sleep(2)  # the outage is the input of this test
+            self.station = self.place.start_station(http=ports["http"], robots=ports["robots"])
+            self.station.wait_for_robot("cart-1", PATIENCE_S)
+        self.assertEqual(self.robot()["boot_id"], before["boot_id"])
+        self.assert_all_is_recorded()
+
+    def test_over_tls_with_a_token(self):
+        with lab() as place:
+            self.place = place
+            self.assertEqual(place.tool("certificate", "--data", place.data).returncode, 0)
+            self.station = place.start_station(config='[tls]\nmode = "on"\n[robots]\nenrol_on_loopback = false\n')
+            token = place.folder / "cart-1.token"
+            enrolled = place.tool("robot", "enroll", "cart-1", "--json", "--data", place.data)
+            token.write_text(json.loads(enrolled.stdout)["secret"])
+            trusted = ("--tls-ca", place.data / "tls" / "lab-ca.crt")
+            self.start_robot(self.station.endpoints["robots"], *trusted, "--token-file", token)
+            self.verified("set_duty", duty=0.1)
+            self.assertEqual(self.place.log("cart-1").count("connected to"), 1)
+
+
+if __name__ == "__main__":
+    unittest.main()
