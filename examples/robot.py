@@ -67,7 +67,7 @@ class Robot:
         self.lease_until_us = self.auto_until_us = 0
         self.has_lapsed = self.is_saturated = False
         self.emergency_id, self.emergency_cause = 0, pb.EMERGENCY_CAUSE_NONE
-        self.link_timeout_us, self.heard_us, self.is_linked = 1_000_000, 0, True
+        self.link_timeout_us, self.heard_us, self.is_link_lost = 1_000_000, None, False  # before the first Welcome: no link
         self.recent_ids = collections.deque(maxlen=64)
         self.stop_acks, self.acks = collections.deque(maxlen=8), collections.deque(maxlen=8)
         self.ticked_us = self.missed_ticks = self.bad_frames = 0
@@ -95,7 +95,7 @@ class Robot:
 
     def per_batch(self):
         """The fields that all samples of a batch share."""
-        flags = (pb.TELEMETRY_FLAG_SATURATED * self.is_saturated | pb.TELEMETRY_FLAG_LINK_LOSS * (not self.is_linked) |
+        flags = (pb.TELEMETRY_FLAG_SATURATED * self.is_saturated | pb.TELEMETRY_FLAG_LINK_LOSS * self.is_link_lost |
                  pb.TELEMETRY_FLAG_POSITION_LIMIT * self.is_outside | pb.TELEMETRY_FLAG_LEASE_LAPSED * self.has_lapsed)
         sub_state = pb.SUB_STATE_NAVIGATING if self.mode == pb.MODE_AUTO else pb.SUB_STATE_NONE
         return {"mode": self.mode, "sub_state": sub_state, "setpoint_m": self.setpoint_m, "flags": flags,
@@ -132,16 +132,17 @@ class Robot:
 
     def watch_link(self, now_us):
         # SAFETY: without a station the robot comes to rest, and nothing moves by itself when the link is back.
-        if self.is_linked and now_us - self.heard_us >= self.link_timeout_us:
-            self.is_linked = False
+        is_silent = self.heard_us is not None and now_us - self.heard_us >= self.link_timeout_us
+        if is_silent and not self.is_link_lost:
+            self.is_link_lost = True
             self.note("link_lost", "link_loss")
             if self.mode != pb.MODE_EMERGENCY:
                 self.rest(pb.MODE_MANUAL, "link_loss")
 
     def heard(self, now_us):
         self.watch_link(now_us)  # a frame that ends a long silence does not hide it
-        if not self.is_linked:
-            self.is_linked = True
+        if self.is_link_lost:
+            self.is_link_lost = False
             self.note("link_restored", "none", (now_us - self.heard_us) / 1e6)
         self.heard_us = now_us
 
@@ -189,7 +190,7 @@ class Robot:
         (self.stop_acks if action == "emergency_stop" else self.acks).append(ack)
 
     def act(self, command, action, now_us):
-        is_repeated = command.command_id in self.recent_ids
+        is_repeated = command.command_id != 0 and command.command_id in self.recent_ids
         if action == "emergency_stop":  # SAFETY: obeyed in every state, whatever its boot and its age
             check(not is_repeated or self.emergency_id == 0, "duplicate")
             self.recent_ids.append(command.command_id)
@@ -276,10 +277,8 @@ async def keep_ticking(robot, link):
 
 
 async def run(options):
-    token = pathlib.Path(options.token_file).read_text(encoding="utf-8").strip() if options.token_file else ""
-    tls = ssl.create_default_context(cafile=options.tls_ca) if options.tls_ca else None
-    robot = Robot(options.id, token)
-    link = StationLink(robot, *options.station, tls)
+    robot = Robot(options.id, options.token_file or "")
+    link = StationLink(robot, *options.station, options.tls_ca)
     try:
         async with asyncio.TaskGroup() as tasks:
             tasks.create_task(keep_ticking(robot, link))
@@ -295,12 +294,26 @@ def address(text):
     return host.strip("[]"), int(port)
 
 
+def token_in(path):
+    try:
+        return pathlib.Path(path).read_text(encoding="utf-8").strip()
+    except OSError as error:
+        raise argparse.ArgumentTypeError(error) from error
+
+
+def trust_in(path):
+    try:
+        return ssl.create_default_context(cafile=path)
+    except OSError as error:
+        raise argparse.ArgumentTypeError(f"'{path}' is no file with a certificate: {error}") from error
+
+
 def main():
     parser = argparse.ArgumentParser(description="A simulated cart on a track, for a Rheonaut station.")
     parser.add_argument("--station", type=address, default="127.0.0.1:7070", metavar="HOST:PORT")
     parser.add_argument("--id", default="cart-1", help="1 to 31 characters of [a-z0-9_-]")
-    parser.add_argument("--token-file", help="with the token that `rheonaut robot enroll` prints")
-    parser.add_argument("--tls-ca", help="TLS, with a station whose certificate this authority has signed")
+    parser.add_argument("--token-file", type=token_in, help="with the token that `rheonaut robot enroll` prints")
+    parser.add_argument("--tls-ca", type=trust_in, help="TLS, with a station whose certificate this authority has signed")
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # both ways to end it end it in the same way
     try:
         asyncio.run(run(parser.parse_args()))

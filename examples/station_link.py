@@ -1,6 +1,6 @@
 """A robot's connection to a Rheonaut station, as docs/protocol.md describes it: kept up, and nothing is lost over it.
 
-What it asks of the robot: now_us(), hello(), status(), on_command() and heard(); is_linked, link_timeout_us and bad_frames;
+What it asks of the robot: now_us(), hello(), status(), on_command() and heard(); is_link_lost, link_timeout_us and bad_frames;
 the rings `samples`, of (robot_time_us, fields of the batch, values), and `events`; the queues `stop_acks` and `acks`.
 """
 import asyncio
@@ -125,6 +125,8 @@ class Connection:
     def on_heartbeat(self, heartbeat, now_us):
         self.acknowledge(heartbeat)
         if heartbeat.resend_first_seq < heartbeat.resend_next_seq:
+            if self.backfill_seq >= self.backfill_end_seq:  # no other backfill is under way
+                self.backfill_seq = self.backfill_end_seq = heartbeat.resend_first_seq
             self.backfill_seq = min(self.backfill_seq, heartbeat.resend_first_seq)
             self.backfill_end_seq = max(self.backfill_end_seq, min(heartbeat.resend_next_seq, self.live_seq))
         if heartbeat.resend_events:
@@ -134,7 +136,7 @@ class Connection:
                                                    echo_received_at_robot_us=now_us))
 
     def on_tick(self):
-        if self.is_welcome and not self.robot.is_linked:
+        if self.is_welcome and self.robot.is_link_lost:
             return self.writer.transport.abort()  # the station was silent for too long: dial again
         if self.is_welcome:
             self.credit = min(self.credit + 2, MAX_BATCH)  # backfill takes at most twice the rate of live samples
@@ -225,7 +227,12 @@ class StationLink:
 
     def __init__(self, robot, host, port, tls=None):
         self.robot, self.host, self.port, self.tls = robot, host, port, tls
-        self.connection = None
+        self.connection, self.said = None, ""
+
+    def say(self, line):
+        if line != self.said:  # not again at each attempt
+            print(f"robot.py: {line}", flush=True)
+        self.said = line
 
     def on_tick(self):
         if self.connection:
@@ -237,8 +244,8 @@ class StationLink:
                 await self.connect_and_serve()
             except (OSError, EOFError, ValueError, DecodeError) as error:
                 self.robot.bad_frames += isinstance(error, (ValueError, DecodeError))
-                why = "the station closed the connection" if isinstance(error, EOFError) else error
-                print(f"robot.py: {self.host}:{self.port}: {str(why) or 'no answer'}", flush=True)
+                why = "the station closed the connection" if isinstance(error, EOFError) else str(error) or "no answer"
+                self.say(f"{self.host}:{self.port}: {why}")
             self.connection = None
             pause_s = random.uniform(0.1, 0.6)
             await asyncio.sleep(4 * pause_s if self.robot.samples.is_full() else pause_s)
@@ -251,7 +258,7 @@ class StationLink:
                 while not self.connection.is_welcome:
                     await self.connection.receive()
                 attempt.reschedule(None)
-                print(f"robot.py: connected to {self.host}:{self.port} as {self.robot.robot_id}", flush=True)
+                self.say(f"connected to {self.host}:{self.port} as {self.robot.robot_id}")
                 while True:
                     await self.connection.receive()
             finally:

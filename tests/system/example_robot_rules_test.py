@@ -121,6 +121,8 @@ class JudgementTest(Bench):
     def test_a_stop_needs_no_boot_and_no_time_and_is_undone_by_its_own_id_alone(self):
         self.answer(self.duty(0.5))
         self.run_for(S // 10)
+        for _ in range(2):
+            self.assertEqual(self.answer(pb.Command(emergency_stop=pb.EmergencyStop())), "accepted", "also without an id")
         stop = pb.Command(command_id=77, emergency_stop=pb.EmergencyStop())
         self.assertEqual(self.answer(stop), "accepted")
         self.assertEqual(self.robot.cart.duty, 0, "before the next tick")
@@ -154,6 +156,16 @@ class JudgementTest(Bench):
         self.run_for(S)
         self.assertEqual(self.robot.cart.duty, 0.0)
         self.assertEqual(self.kinds()[-3:], ["link_lost", "mode_changed", "link_restored"])
+
+    def test_before_the_first_welcome_there_is_no_link_to_lose(self):
+        self.run_for(10 * S, is_heard=False)
+        self.assertEqual((self.kinds(), self.robot.samples[999][1]["flags"]), (["boot"], 0))
+
+    def test_nothing_that_is_left_over_moves_the_motor_in_an_emergency(self):
+        self.answer(self.stop())
+        self.robot.duty, self.robot.lease_until_us = 0.5, 10 * S  # as by a fault elsewhere in the program
+        self.run_for(S)
+        self.assertEqual((self.robot.cart.duty, self.robot.cart.position_m), (0, 0))
 
     def test_a_command_after_a_standstill_of_the_robot_finds_it_at_rest(self):
         self.answer(self.auto(1.0))
@@ -214,6 +226,14 @@ class OrderTest(Bench):
         self.connection.on_frame(pb.StationFrame(**body), self.now_us)
         self.connection.flush()
 
+    def sent_again(self, **heartbeat):
+        """(first number, count) of each batch of backfill that follows a StationHeartbeat."""
+        self.wire.bodies()
+        self.receive(heartbeat=pb.StationHeartbeat(**heartbeat))
+        self.run_ticks(20)
+        batches = [frame.telemetry for frame in self.wire.sent if frame.telemetry.flags & pb.TELEMETRY_FLAG_BACKFILL]
+        return [(batch.first_seq, len(batch.duty)) for batch in batches]
+
     def run_ticks(self, count):
         for _ in range(count):
             self.run_for(10_000)
@@ -267,13 +287,21 @@ class OrderTest(Bench):
         self.assertIn(lapsed_seq, [batch.first_seq for batch in batches], "a flag changes there")
         backfill = [batch for batch in batches if batch.flags & pb.TELEMETRY_FLAG_BACKFILL]
         self.assertEqual(sum(len(batch.duty) for batch in backfill), 150)
-        self.wire.bodies()
-        self.receive(heartbeat=pb.StationHeartbeat(durable_next_seq=340, resend_first_seq=100, resend_next_seq=345))
-        self.run_ticks(20)
-        again = [frame.telemetry for frame in self.wire.sent if frame.telemetry.flags & pb.TELEMETRY_FLAG_BACKFILL]
-        self.assertEqual([(batch.first_seq, len(batch.duty)) for batch in again], [(340, 5)], "as far as it is held")
+        self.assertEqual(self.sent_again(resend_first_seq=60, resend_next_seq=70), [(60, 10)])
+        again = self.sent_again(durable_next_seq=340, resend_first_seq=100, resend_next_seq=345)
+        self.assertEqual(again, [(340, 5)], "as far as it is held")
         self.receive(heartbeat=pb.StationHeartbeat(durable_next_seq=10**6))
         self.assertEqual(self.robot.samples.oldest_seq, 340, "an acknowledgement of what was never made is ignored")
+
+    def test_what_is_asked_for_during_backfill_is_sent_as_well(self):
+        self.run_for(3 * S)
+        self.connect()
+        self.run_ticks(60)
+        again = self.sent_again(resend_first_seq=10, resend_next_seq=20)
+        self.assertEqual(again[0], (10, 25))
+        self.run_ticks(200)
+        seqs = {frame.telemetry.first_seq + i for frame in self.wire.sent for i in range(len(frame.telemetry.duty))}
+        self.assertTrue(seqs.issuperset(range(100, 300)), "and the backfill goes on to its end")
 
     def test_backfill_takes_twice_the_rate_of_live_samples(self):
         self.run_for(10 * S)

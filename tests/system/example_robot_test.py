@@ -13,6 +13,27 @@ from processes import ApiError, commanded, lab, wait_until
 from recording_audit import audit
 
 PATIENCE_S = 60  # far beyond what any step takes: the tests judge order and outcome
+# The same robot without events, status, stop probes, auto and all that docs/protocol.md lets a robot leave out.
+LESS = """
+import sys
+sys.path.insert(0, sys.argv.pop(1))
+from robot import Robot, check, main, pb
+from station_link import Connection
+hello, set_mode = Robot.hello, Robot.do_set_mode
+def hello_of_less(robot):
+    message = hello(robot)
+    message.answers_stop_probes = False
+    return message
+def set_manual(robot, wanted, *rest):
+    check(wanted.mode == pb.MODE_MANUAL, "unsupported")
+    set_mode(robot, wanted, *rest)
+Robot.hello, Robot.do_set_mode, Robot.note = hello_of_less, set_manual, lambda *_, **__: None
+del Robot.do_set_setpoint, Robot.do_zero_position
+def only_signs_of_life(connection):
+    return {"heartbeat": pb.Heartbeat()} if connection.robot.now_us() - connection.sent_us >= connection.heartbeat_us else None
+Connection.next_status = only_signs_of_life
+main()
+"""
 
 
 class ExampleRobotTest(unittest.TestCase):
@@ -23,9 +44,8 @@ class ExampleRobotTest(unittest.TestCase):
         self.station = self.place.start_station()
         return self.station
 
-    def start_robot(self, address, *flags):
-        robot = self.place._start("cart-1", sys.executable, "-B", EXAMPLES / "robot.py", "--station", address, "--id",
-                                  "cart-1", *flags)
+    def start_robot(self, address, *flags, program=(EXAMPLES / "robot.py",)):
+        robot = self.place._start("cart-1", sys.executable, "-B", *program, "--station", address, "--id", "cart-1", *flags)
         self.station.wait_for_robot("cart-1", PATIENCE_S)
         return robot
 
@@ -70,6 +90,7 @@ class ExampleRobotTest(unittest.TestCase):
         """Every number of the one boot is there once. Ends the station."""
         made = self.robot()["next_seq"]
         wait_until(lambda: self.robot()["durable_next_seq"] >= made, PATIENCE_S, "what was made until now is on disk")
+        wait_until(lambda: self.robot()["oldest_seq"] >= made, PATIENCE_S, "the robot has dropped what is on disk")
         self.assertEqual(self.place.stop_station(), 0)
         faults, stored, lost = audit(self.place.data / "station.sqlite")
         self.assertEqual((faults, lost), ([], 0))
@@ -158,6 +179,36 @@ class ExampleRobotTest(unittest.TestCase):
             self.station = self.place.start_station(http=ports["http"], robots=ports["robots"])
             self.station.wait_for_robot("cart-1", PATIENCE_S)
         self.assertEqual(self.robot()["boot_id"], before["boot_id"])
+        self.assert_all_is_recorded()
+
+    def test_a_robot_that_lost_its_latch_is_stopped_again_when_it_returns(self):
+        station = self.started()
+        robot = self.start_robot(station.endpoints["robots"])
+        boot = self.robot()["boot_id"]
+        station.post("/api/v1/robots/cart-1/emergency-stop")
+        robot.kill()
+        robot.wait()
+        self.start_robot(station.endpoints["robots"])
+        again = wait_until(lambda: self.robot()["mode"] == "emergency" and self.robot()["boot_id"] != boot, PATIENCE_S,
+                           "it is latched in its new boot")
+        self.assertTrue(again)
+        self.assert_nothing_moves(0)
+
+    def test_a_robot_that_has_less(self):
+        station = self.started()
+        self.start_robot(station.endpoints["robots"], program=("-c", LESS, EXAMPLES))
+        self.assertIsNone(self.robot()["stop_path"])
+        for part, content in (("parameters", "parameters"), ("controller", "controller")):
+            self.assertIsNone(station.get(f"/api/v1/robots/cart-1/{part}")[content])
+        self.verified("set_duty", duty=0.3)
+        with self.assertRaises(ApiError) as refused:
+            station.command("cart-1", "set_mode", mode="auto", setpoint_m=0.1)
+        self.assertEqual(refused.exception.reason, "unsupported")
+        stopped = station.post("/api/v1/robots/cart-1/emergency-stop")
+        self.verified("clear_emergency", emergency_id=stopped["emergency_id"])
+        self.verified("set_mode", mode="manual")
+        self.assert_nothing_moves(stopped["effect_at_robot_us"])
+        self.assertIsNone(self.robot()["status"])
         self.assert_all_is_recorded()
 
     def test_over_tls_with_a_token(self):
