@@ -248,6 +248,29 @@ class OrderTest(Bench):
         self.receive(command=self.stop())
         self.assertEqual(self.wire.bodies(), ["command_ack"])
 
+    def test_acknowledgements_wait_for_a_connection_and_none_pushes_out_that_of_a_stop(self):
+        self.answer_later(self.stop())
+        pings = [self.command(ping=pb.Ping()) for _ in range(20)]
+        self.answer_later(*pings)
+        self.connect()
+        waited = [frame.command_ack.command_id for frame in self.wire.sent if frame.WhichOneof("body") == "command_ack"]
+        self.assertEqual(waited, [1, *(ping.command_id for ping in pings[-8:])])
+
+    def answer_later(self, *commands):
+        for command in commands:
+            self.robot.on_command(command, self.now_us)
+
+    def test_events_come_again_until_they_are_durable_and_the_clock_is_answered(self):
+        self.connect()
+        self.answer(self.auto(0.1))
+        self.run_ticks(2)
+        self.wire.bodies()
+        self.receive(heartbeat=pb.StationHeartbeat(durable_next_event_seq=1, resend_events=True, station_time_us=99))
+        events = [frame.event for frame in self.wire.sent if frame.WhichOneof("body") == "event"]
+        self.assertEqual([(event.event_seq, event.oldest_event_seq) for event in events], [(1, 1), (2, 1)])
+        clock = next(frame.heartbeat for frame in self.wire.sent if frame.WhichOneof("body") == "heartbeat")
+        self.assertEqual((clock.echo_station_time_us, clock.echo_received_at_robot_us), (99, self.now_us))
+
     def test_what_waited_leaves_in_the_documented_order(self):
         self.run_for(S)
         self.connect()

@@ -2,6 +2,7 @@
 and after the station's death; a command that comes too late; TLS and a token."""
 import json
 import signal
+import socket
 import subprocess
 import sys
 import time
@@ -13,6 +14,8 @@ from processes import ApiError, commanded, lab, wait_until
 from recording_audit import audit
 
 PATIENCE_S = 60  # far beyond what any step takes: the tests judge order and outcome
+PATIENT_LINK = "[robots]\nlink_timeout_ms = 5000\n"  # a machine that stands still for a second is no lost link
+OUTAGE_S = 8
 # The same robot without events, status, stop probes, auto and all that docs/protocol.md lets a robot leave out.
 LESS = """
 import sys
@@ -39,27 +42,33 @@ main()
 class ExampleRobotTest(unittest.TestCase):
     """With a real station, in real time."""
 
-    def started(self, config=None):
-        self.place = self.enterContext(lab(config=config))
+    def started(self):
+        self.place = self.enterContext(lab(config=PATIENT_LINK))
         self.station = self.place.start_station()
         return self.station
 
     def start_robot(self, address, *flags, program=(EXAMPLES / "robot.py",)):
-        robot = self.place._start("cart-1", sys.executable, "-B", *program, "--station", address, "--id", "cart-1", *flags)
+        robot = self.begin_robot(address, *flags, program=program)
         self.station.wait_for_robot("cart-1", PATIENCE_S)
         return robot
+
+    def begin_robot(self, address, *flags, program=(EXAMPLES / "robot.py",), robot_id="cart-1"):
+        return self.place._start(robot_id, sys.executable, "-B", *program, "--station", address, "--id", robot_id, *flags)
 
     def robot(self):
         return self.station.robot("cart-1")
 
     def verified(self, kind, **arguments):
-        """The station has seen the command's effect in the robot's telemetry."""
-        command_id = commanded(self.station, kind, "cart-1", **arguments)["command_id"]
-        return wait_until(lambda: self.state_of(command_id, "verified"), PATIENCE_S, f"{kind} verified")
+        """The station has seen the command's effect in the robot's telemetry. What a machine that stood still has let end
+        too early, such as a lease, is given again."""
+        def is_verified():
+            command_id = commanded(self.station, kind, "cart-1", **arguments)["command_id"]
+            return wait_until(lambda: self.ended(command_id), PATIENCE_S, f"{kind} ends")["state"] == "verified"
+        wait_until(is_verified, PATIENCE_S, f"{kind} verified")
 
-    def state_of(self, command_id, state):
+    def ended(self, command_id):
         record = self.station.get(f"/api/v1/commands/{command_id}")
-        return record if record["state"] == state else None
+        return record if record["ended_at_us"] else None
 
     def more_samples(self, count=100):
         seen = self.robot()["next_seq"]
@@ -101,6 +110,7 @@ class ExampleRobotTest(unittest.TestCase):
         robot = self.start_robot(station.endpoints["robots"])
         self.assertIsNone(self.robot()["sample"]["impedance_mv"], "it has no such sensor")
         wait_until(lambda: self.robot()["stop_path"]["is_open"], PATIENCE_S, "the way of a stop is open")
+        wait_until(lambda: self.robot()["clock"], PATIENCE_S, "its clock is known")
 
         self.verified("set_duty", duty=0.4)
         lapsed = wait_until(lambda: self.event("lease_lapsed"), PATIENCE_S, "the lease lapses")
@@ -113,7 +123,8 @@ class ExampleRobotTest(unittest.TestCase):
         self.verified("set_setpoint", setpoint_m=-0.5)
         wait_until(lambda: self.robot()["sample"]["velocity_m_s"] < -0.1, PATIENCE_S, "it moves")
         stopped = station.post("/api/v1/robots/cart-1/emergency-stop")
-        wait_until(lambda: self.state_of(stopped["command_id"], "verified"), PATIENCE_S, "the stop is verified")
+        ended = wait_until(lambda: self.ended(stopped["command_id"]), PATIENCE_S, "the stop has an end")
+        self.assertEqual(ended["state"], "verified")
         self.assertEqual(self.robot()["mode"], "emergency")
         with self.assertRaises(ApiError) as refused:
             station.command("cart-1", "set_duty", duty=0.1)
@@ -132,7 +143,7 @@ class ExampleRobotTest(unittest.TestCase):
         self.assertEqual(robot.wait(timeout=PATIENCE_S), 0, "it ends in order")
 
     def test_a_command_that_comes_too_late_is_refused_and_moves_nothing(self):
-        station = self.started(config="[robots]\nlink_timeout_ms = 5000\n")
+        station = self.started()
         robot = self.start_robot(station.endpoints["robots"])
         robot.send_signal(signal.SIGSTOP)  # what is sent to it now waits in its socket
         try:
@@ -142,8 +153,11 @@ class ExampleRobotTest(unittest.TestCase):
             command_id = station.get("/api/v1/robots/cart-1/commands?limit=1")["commands"][0]["command_id"]
         finally:
             robot.send_signal(signal.SIGCONT)
-        late = wait_until(lambda: self.state_of(command_id, "expired"), PATIENCE_S, "it is refused as expired")
-        self.assertEqual((late["reason"], late["effect_at_robot_us"]), ("expired", None))
+        def answer():
+            record = self.station.get(f"/api/v1/commands/{command_id}")
+            return record if record["state"] != "unknown" else None
+        late = wait_until(answer, PATIENCE_S, "its late answer")
+        self.assertEqual((late["state"], late["reason"], late["effect_at_robot_us"]), ("expired", "expired", None))
         self.assert_nothing_moves(0)
 
     def test_after_a_cut_link_every_sample_is_there_once(self):
@@ -156,7 +170,7 @@ class ExampleRobotTest(unittest.TestCase):
         self.start_robot(address)
         self.verified("set_mode", mode="auto", setpoint_m=1.0)
         wait_until(lambda: self.robot()["sample"]["velocity_m_s"] > 0.1, PATIENCE_S, "it moves")
-        print("outage 3", file=proxy.stdin, flush=True)
+        print("outage", OUTAGE_S, file=proxy.stdin, flush=True)
         wait_until(lambda: self.robot()["link"] == "disconnected", PATIENCE_S, "the link is cut")
         wait_until(lambda: self.robot()["link"] == "connected", PATIENCE_S, "the robot has dialled again")
         self.more_samples()
@@ -211,18 +225,43 @@ class ExampleRobotTest(unittest.TestCase):
         self.assertIsNone(self.robot()["status"])
         self.assert_all_is_recorded()
 
+    def test_a_station_that_hangs_is_dialled_again(self):
+        self.started()
+        with socket.create_server(("127.0.0.1", 0)) as hanging:
+            hanging.settimeout(PATIENCE_S)
+            self.begin_robot("127.0.0.1:%d" % hanging.getsockname()[1])
+            first, _ = hanging.accept()
+            with first, hanging.accept()[0] as second:
+                self.assertIn(b"cart-1", second.recv(1024), "its Hello")
+                self.assertIn(b"cart-1", first.recv(1024), "and the first connection was one of the robot's, too")
+        wait_until(lambda: "no answer" in self.place.log("cart-1"), PATIENCE_S, "it says so")
+
+    def other_authority(self):
+        with lab() as other:
+            self.assertEqual(other.tool("certificate", "--data", other.data).returncode, 0)
+            copy = self.place.folder / "other-ca.crt"
+            copy.write_bytes((other.data / "tls" / "lab-ca.crt").read_bytes())
+        return copy
+
     def test_over_tls_with_a_token(self):
         with lab() as place:
             self.place = place
             self.assertEqual(place.tool("certificate", "--data", place.data).returncode, 0)
-            self.station = place.start_station(config='[tls]\nmode = "on"\n[robots]\nenrol_on_loopback = false\n')
+            self.station = place.start_station(config=f'{PATIENT_LINK}enrol_on_loopback = false\n[tls]\nmode = "on"\n')
+            address = self.station.endpoints["robots"]
             token = place.folder / "cart-1.token"
             enrolled = place.tool("robot", "enroll", "cart-1", "--json", "--data", place.data)
             token.write_text(json.loads(enrolled.stdout)["secret"])
             trusted = ("--tls-ca", place.data / "tls" / "lab-ca.crt")
-            self.start_robot(self.station.endpoints["robots"], *trusted, "--token-file", token)
+            self.start_robot(address, *trusted, "--token-file", token)
             self.verified("set_duty", duty=0.1)
             self.assertEqual(self.place.log("cart-1").count("connected to"), 1)
+            for robot_id, why, flags in (("stranger", "robot 'stranger' is not enrolled", trusted),
+                                         ("plain", f"{address}: ", ()),  # reset or closed, as it happens
+                                         ("deceived", "CERTIFICATE_VERIFY_FAILED", ("--tls-ca", self.other_authority()))):
+                self.begin_robot(address, *flags, robot_id=robot_id)
+                wait_until(lambda: why in place.log(robot_id), PATIENCE_S, f"'{why}' of {robot_id}")
+                self.assertNotIn("connected to", place.log(robot_id))
 
 
 if __name__ == "__main__":
