@@ -155,9 +155,10 @@ class ExampleRobotTest(unittest.TestCase):
             robot.send_signal(signal.SIGCONT)
         def answer():
             record = self.station.get(f"/api/v1/commands/{command_id}")
-            return record if record["state"] != "unknown" else None
+            return record if record["state"] not in ("sent", "unknown") else None
         late = wait_until(answer, PATIENCE_S, "its late answer")
         self.assertEqual((late["state"], late["reason"], late["effect_at_robot_us"]), ("expired", "expired", None))
+        wait_until(lambda: self.robot()["status"]["missed_ticks"] > 100, PATIENCE_S, "it counts the ticks of that second")
         self.assert_nothing_moves(0)
 
     def test_after_a_cut_link_every_sample_is_there_once(self):
