@@ -8,23 +8,21 @@ docs/your_own_robot.md explains it step by step. For a robot of yours, put its m
 law into Robot.controller; station_link.py stays as it is. Both need Debian's protobuf-compiler and python3-protobuf, and
 the latter belongs to Debian's own Python, which the first line names.
 
-What it does not have, it refuses as `unsupported`: parameters, other controllers than its own, timed commands, duty
-schedules and disturbances.
+What it does not have, it refuses as `unsupported`: parameters, and other controllers than its own.
 """
 import argparse
 import asyncio
 import collections
 import math
-import pathlib
 import secrets
 import signal
-import ssl
 import sys
 import time
 
-from station_link import PERIOD_US, Ring, StationLink, pb
+from station_link import PERIOD_US, Ring, StationLink, address, pb, token_in, trust_in
 
 LEASE_MS, MAX_LIFE_US, AUTO_LIMIT_S = 500, 10_000_000, 600
+MAX_TIMED, MAX_SCHEDULE = 4, 64
 RING_SAMPLES, RING_EVENTS = 6_000, 64  # one minute without a station loses nothing
 POSITION_LIMIT_M = 1.2  # on both sides the track ends there
 KP_PER_M, KD_S_PER_M = 10.0, 1.0
@@ -64,7 +62,10 @@ class Robot:
         self.cart, self.zero_m, self.is_outside = Cart(), 0.0, False
         self.samples, self.events = Ring(RING_SAMPLES), Ring(RING_EVENTS)
         self.mode, self.duty, self.setpoint_m = pb.MODE_MANUAL, 0.0, None
-        self.lease_until_us = self.auto_until_us = 0
+        self.schedule, self.schedule_began_us = collections.deque(), None  # pairs of tick and duty that are to come
+        self.timed = []  # commands that wait for their time, the next one first
+        self.lease_until_us = self.timed_until_us = self.auto_until_us = 0
+        self.disturbance_m = 0.0
         self.has_lapsed = self.is_saturated = False
         self.emergency_id, self.emergency_cause = 0, pb.EMERGENCY_CAUSE_NONE
         self.link_timeout_us, self.heard_us, self.is_link_lost = 1_000_000, None, False  # before the first Welcome: no link
@@ -79,6 +80,15 @@ class Robot:
     @property
     def position_m(self):
         return self.cart.position_m - self.zero_m
+
+    @property
+    def seen_m(self):
+        """The position as the controller and telemetry see it."""
+        return self.position_m + self.disturbance_m
+
+    @property
+    def has_orders(self):
+        return self.duty != 0 or bool(self.schedule)
 
     def hello(self):
         return pb.Hello(
@@ -99,14 +109,14 @@ class Robot:
                  pb.TELEMETRY_FLAG_POSITION_LIMIT * self.is_outside | pb.TELEMETRY_FLAG_LEASE_LAPSED * self.has_lapsed)
         sub_state = pb.SUB_STATE_NAVIGATING if self.mode == pb.MODE_AUTO else pb.SUB_STATE_NONE
         return {"mode": self.mode, "sub_state": sub_state, "setpoint_m": self.setpoint_m, "flags": flags,
-                "emergency_id": self.emergency_id, "emergency_cause": self.emergency_cause}
+                "disturbance_m": self.disturbance_m, "emergency_id": self.emergency_id, "emergency_cause": self.emergency_cause}
 
     def note(self, kind, cause, value=0.0, command_id=0):
         """Adds an event: its kind and cause are those of docs/protocol.md."""
         self.events.add(pb.Event(
             event_seq=self.events.next_seq, event_robot_time_us=self.now_us(), sample_seq=self.samples.next_seq,
             kind=f"EVENT_KIND_{kind.upper()}", cause=f"EVENT_CAUSE_{cause.upper()}", value=value, command_id=command_id,
-            position_m=self.position_m, mode=self.mode, sub_state=self.per_batch()["sub_state"],
+            position_m=self.seen_m, mode=self.mode, sub_state=self.per_batch()["sub_state"],
             emergency_id=self.emergency_id, emergency_cause=self.emergency_cause))
 
     def step(self, tick_us):
@@ -116,17 +126,19 @@ class Robot:
         self.watch_time(tick_us)
         self.cart.move(dt_us / 1e6)
         self.watch_position()
+        self.run_timed(tick_us)
+        self.follow_schedule(tick_us)
         duty = self.controller() if self.mode == pb.MODE_AUTO else self.duty
         # SAFETY: whatever was computed above, the motor is off in an emergency.
         self.cart.duty = 0.0 if self.mode == pb.MODE_EMERGENCY else duty
         reference_m = math.nan if self.setpoint_m is None else self.setpoint_m
-        values = (self.position_m, self.cart.velocity_m_s, self.cart.acceleration_m_s2, self.cart.duty,
+        values = (self.seen_m, self.cart.velocity_m_s, self.cart.acceleration_m_s2, self.cart.duty,
                   math.nan, reference_m)  # it has no impedance sensor
         self.samples.add((tick_us, self.per_batch(), values))
 
     def controller(self):
         """Proportional on the error, derivative on the measured speed."""
-        duty = KP_PER_M * (self.setpoint_m - self.position_m) - KD_S_PER_M * self.cart.velocity_m_s
+        duty = KP_PER_M * (self.setpoint_m - self.seen_m) - KD_S_PER_M * self.cart.velocity_m_s
         self.is_saturated = abs(duty) > 1
         return max(-1.0, min(1.0, duty))
 
@@ -136,6 +148,7 @@ class Robot:
         if is_silent and not self.is_link_lost:
             self.is_link_lost = True
             self.note("link_lost", "link_loss")
+            self.drop_timed("expired")
             if self.mode != pb.MODE_EMERGENCY:
                 self.rest(pb.MODE_MANUAL, "link_loss")
 
@@ -147,13 +160,38 @@ class Robot:
         self.heard_us = now_us
 
     def watch_time(self, tick_us):
-        # SAFETY: a duty runs no longer than its lease, and auto no longer than its limit.
-        if self.duty != 0 and tick_us >= self.lease_until_us:
+        # SAFETY: no duty runs and no command waits longer than its lease, and auto runs no longer than its limit.
+        if self.has_orders and tick_us >= self.lease_until_us:
             lapsed, self.duty, self.has_lapsed = self.duty, 0.0, True
+            self.schedule.clear()
             self.note("lease_lapsed", "time", lapsed)
+            self.drop_timed("expired")
+        if tick_us >= self.timed_until_us:
+            self.drop_timed("expired")
         if self.mode == pb.MODE_AUTO and tick_us >= self.auto_until_us:
             self.note("auto_limit", "time", AUTO_LIMIT_S)
             self.rest(pb.MODE_MANUAL, "time")
+
+    def run_timed(self, tick_us):
+        while self.timed and tick_us >= self.timed[0].execute_at_robot_us:
+            command = self.timed.pop(0)
+            try:
+                check(tick_us <= command.valid_until_robot_us, "expired")
+                self.carry_out(command, tick_us)
+            except Refused as refused:
+                self.acknowledge(command, refused.args[0])  # for the second time
+
+    def drop_timed(self, word):
+        while self.timed:
+            self.acknowledge(self.timed.pop(0), word)
+
+    def follow_schedule(self, tick_us):
+        if self.schedule and self.schedule_began_us is None:
+            self.schedule_began_us = tick_us
+        while self.schedule and tick_us >= self.schedule_began_us + self.schedule[0][0] * PERIOD_US:
+            self.duty = self.schedule.popleft()[1]
+            if not self.schedule:
+                self.note("duty_schedule_ended", "time")
 
     def watch_position(self):
         was_outside, self.is_outside = self.is_outside, abs(self.position_m) > POSITION_LIMIT_M
@@ -164,8 +202,11 @@ class Robot:
 
     def rest(self, mode, cause, command_id=0):
         """Enters the mode with the motor off: no duty, lease or setpoint outlives a change of mode."""
-        self.cart.duty = self.duty = 0.0
+        self.cart.duty = self.duty = self.disturbance_m = 0.0
+        self.schedule.clear()
         was, self.mode, self.setpoint_m = self.mode, mode, None
+        if was != mode:
+            self.drop_timed("latched" if mode == pb.MODE_EMERGENCY else "wrong_mode")
         self.has_lapsed = self.is_saturated = False
         if was != mode and pb.MODE_EMERGENCY not in (was, mode):
             self.note("mode_changed", cause, command_id=command_id)
@@ -176,33 +217,57 @@ class Robot:
         self.note("emergency", cause, command_id=command_id)
 
     def on_command(self, command, now_us):
-        """Does a command, or not, and leaves the acknowledgement to be sent."""
-        ack = pb.CommandAck(command_id=command.command_id, result=pb.COMMAND_RESULT_ACCEPTED, effect_at_robot_us=now_us)
-        action = command.WhichOneof("action")
+        """Does a command, or stores it, or not, and acknowledges it."""
         try:
-            self.act(command, action, now_us)
+            self.acknowledge(command, "accepted", self.act(command, now_us))
         except Refused as refused:
-            ack.effect_at_robot_us, word = 0, refused.args[0].upper()
-            is_result = word in ("EXPIRED", "DUPLICATE", "OTHER_BOOT")
-            ack.result = pb.CommandResult.Value(f"COMMAND_RESULT_{word if is_result else 'REJECTED'}")
-            ack.reason = pb.REJECT_REASON_NONE if is_result else pb.RejectReason.Value(f"REJECT_REASON_{word}")
-        ack.emergency_id = self.emergency_id
-        (self.stop_acks if action == "emergency_stop" else self.acks).append(ack)
+            self.acknowledge(command, refused.args[0])
 
-    def act(self, command, action, now_us):
+    def acknowledge(self, command, word, effect_at_robot_us=0):
+        """Leaves an acknowledgement to be sent; the word is a result or a reason of docs/protocol.md."""
+        is_result = word in ("accepted", "expired", "duplicate", "other_boot")
+        acks = self.stop_acks if command.HasField("emergency_stop") else self.acks
+        acks.append(pb.CommandAck(
+            command_id=command.command_id, effect_at_robot_us=effect_at_robot_us, emergency_id=self.emergency_id,
+            result=f"COMMAND_RESULT_{word.upper()}" if is_result else pb.COMMAND_RESULT_REJECTED,
+            reason=pb.REJECT_REASON_NONE if is_result else f"REJECT_REASON_{word.upper()}"))
+
+    def act(self, command, now_us):
+        """Returns when it acts: the effect's time on the robot's clock."""
+        action = command.WhichOneof("action")
         is_repeated = command.command_id != 0 and command.command_id in self.recent_ids
         if action == "emergency_stop":  # SAFETY: obeyed in every state, whatever its boot and its age
             check(not is_repeated or self.emergency_id == 0, "duplicate")
             self.recent_ids.append(command.command_id)
-            return self.stop(pb.EMERGENCY_CAUSE_OPERATOR, "command", command.command_id)
+            self.stop(pb.EMERGENCY_CAUSE_OPERATOR, "command", command.command_id)
+            return now_us
         check(command.command_id != 0 and action is not None, "malformed")
         check(command.boot_id == self.boot_id, "other_boot")
         check(not is_repeated, "duplicate")
         self.recent_ids.append(command.command_id)
         check(now_us <= command.valid_until_robot_us, "expired")  # SAFETY: what was delayed on its way moves nothing
         check(command.valid_until_robot_us - now_us <= MAX_LIFE_US, "life_too_long")
-        check(not command.HasField("execute_at_robot_us") and hasattr(self, f"do_{action}"), "unsupported")
+        check(command.execute_at_robot_us <= command.valid_until_robot_us, "out_of_range")
+        check(hasattr(self, f"do_{action}"), "unsupported")
+        if command.execute_at_robot_us > now_us:
+            return self.store(command, now_us)
+        self.carry_out(command, now_us)
+        if action == "set_duty" and command.set_duty.duty == 0:
+            self.drop_timed("expired")  # SAFETY: a motor that is stopped does not start again by what still waits
+        return now_us
+
+    def carry_out(self, command, now_us):
+        action = command.WhichOneof("action")
         getattr(self, f"do_{action}")(getattr(command, action), command.command_id, now_us)
+
+    def store(self, command, now_us):
+        check(self.mode != pb.MODE_EMERGENCY, "latched")
+        if now_us >= self.timed_until_us:  # SAFETY: what has outlived its lease is not revived by another
+            self.drop_timed("expired")
+        check(len(self.timed) < MAX_TIMED, "busy")
+        self.timed = sorted([*self.timed, command], key=lambda one: one.execute_at_robot_us)
+        self.timed_until_us = now_us + 1000 * LEASE_MS
+        return command.execute_at_robot_us
 
     def check_mode(self, *modes):
         check(self.mode != pb.MODE_EMERGENCY, "latched")  # SAFETY: only clear_emergency leads out of it
@@ -236,14 +301,37 @@ class Robot:
         # SAFETY: beyond an end of the track only the way back is open.
         check(not self.is_outside or wanted.duty * self.position_m <= 0, "outward")
         self.duty, self.has_lapsed = wanted.duty, False
+        self.schedule.clear()
         self.lease_until_us = now_us + 1000 * (wanted.lease_ms or LEASE_MS)
+
+    def do_set_duty_schedule(self, wanted, _, now_us):
+        self.check_mode(pb.MODE_MANUAL)
+        ticks, duties = list(wanted.tick), list(wanted.duty)
+        check(0 < len(ticks) == len(duties) <= MAX_SCHEDULE and duties[-1] == 0, "malformed")
+        check(all(one < next_one for one, next_one in zip(ticks, ticks[1:])), "malformed")
+        check(all(map(math.isfinite, duties)), "not_finite")
+        check(max(map(abs, duties)) <= 1, "out_of_range")
+        check(not self.is_outside or all(duty * self.position_m <= 0 for duty in duties), "outward")
+        self.duty, self.has_lapsed = 0.0, False
+        self.schedule, self.schedule_began_us = collections.deque(zip(ticks, duties)), None
+        self.lease_until_us = now_us + 1000 * LEASE_MS
+
+    def do_inject_disturbance(self, wanted, command_id, _):
+        self.check_mode(pb.MODE_AUTO)
+        self.check_setpoint(wanted.disturbance_m)
+        self.disturbance_m = wanted.disturbance_m
+        self.note("disturbance", "command", self.disturbance_m, command_id)
 
     def do_renew_lease(self, wanted, _, now_us):
         check(self.mode != pb.MODE_EMERGENCY, "latched")
         check(wanted.lease_ms <= LEASE_MS, "out_of_range")
         # SAFETY: a lease that has lapsed is not renewed, not even before the tick that would notice it.
-        check(self.duty != 0 and now_us < self.lease_until_us, "nothing_to_renew")
-        self.lease_until_us = now_us + 1000 * (wanted.lease_ms or LEASE_MS)
+        has_duty = self.has_orders and now_us < self.lease_until_us
+        has_timed = bool(self.timed) and now_us < self.timed_until_us
+        check(has_duty or has_timed, "nothing_to_renew")
+        until_us = now_us + 1000 * (wanted.lease_ms or LEASE_MS)
+        self.lease_until_us = until_us if has_duty else self.lease_until_us
+        self.timed_until_us = until_us if has_timed else self.timed_until_us
 
     def do_clear_emergency(self, wanted, command_id, _):
         # SAFETY: only the latch that the sender has seen is cleared, never one that came after it.
@@ -254,14 +342,15 @@ class Robot:
 
     def do_zero_position(self, _, command_id, __):
         self.check_mode(pb.MODE_MANUAL)
-        check(self.duty == 0, "motor_on")
+        check(not self.has_orders, "motor_on")
         before_m, self.zero_m = self.position_m, self.cart.position_m
         self.note("position_zeroed", "command", before_m, command_id)
 
-    def do_ping(self, *_):
-        """Does nothing. Nor does drop_timed, since no timed command ever waits here."""
+    def do_drop_timed(self, *_):
+        self.drop_timed("expired")
 
-    do_drop_timed = do_ping
+    def do_ping(self, *_):
+        pass
 
 
 async def keep_ticking(robot, link):
@@ -285,27 +374,6 @@ async def run(options):
             tasks.create_task(link.stay_connected())
     finally:
         robot.cart.duty = 0.0  # SAFETY: a program that ends leaves the motor off
-
-
-def address(text):
-    host, _, port = text.rpartition(":")
-    if not host or not port.isdecimal():
-        raise argparse.ArgumentTypeError(f"'{text}' is not HOST:PORT")
-    return host.strip("[]"), int(port)
-
-
-def token_in(path):
-    try:
-        return pathlib.Path(path).read_text(encoding="utf-8").strip()
-    except OSError as error:
-        raise argparse.ArgumentTypeError(error) from error
-
-
-def trust_in(path):
-    try:
-        return ssl.create_default_context(cafile=path)
-    except OSError as error:
-        raise argparse.ArgumentTypeError(f"'{path}' is no file with a certificate: {error}") from error
 
 
 def main():

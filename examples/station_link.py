@@ -3,11 +3,13 @@
 What it asks of the robot: now_us(), hello(), status(), on_command() and heard(); is_link_lost, link_timeout_us and bad_frames;
 the rings `samples`, of (robot_time_us, fields of the batch, values), and `events`; the queues `stop_acks` and `acks`.
 """
+import argparse
 import asyncio
 import collections
 import importlib
 import pathlib
 import random
+import ssl
 import subprocess
 import sys
 import tempfile
@@ -263,3 +265,25 @@ class StationLink:
                     await self.connection.receive()
             finally:
                 writer.transport.abort()
+
+
+def address(text):
+    """HOST:PORT as an option of the command line; the next two are options as well."""
+    host, _, port = text.rpartition(":")
+    if not host or not port.isdecimal():
+        raise argparse.ArgumentTypeError(f"'{text}' is not HOST:PORT")
+    return host.strip("[]"), int(port)
+
+
+def token_in(path):
+    try:
+        return pathlib.Path(path).read_text(encoding="utf-8").strip()
+    except OSError as error:
+        raise argparse.ArgumentTypeError(error) from error
+
+
+def trust_in(path):
+    try:
+        return ssl.create_default_context(cafile=path)
+    except OSError as error:
+        raise argparse.ArgumentTypeError(f"'{path}' is no file with a certificate: {error}") from error

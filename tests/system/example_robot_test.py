@@ -30,8 +30,10 @@ def hello_of_less(robot):
 def set_manual(robot, wanted, *rest):
     check(wanted.mode == pb.MODE_MANUAL, "unsupported")
     set_mode(robot, wanted, *rest)
-Robot.hello, Robot.do_set_mode, Robot.note = hello_of_less, set_manual, lambda *_, **__: None
-del Robot.do_set_setpoint, Robot.do_zero_position
+def store(*_):
+    check(False, "unsupported")
+Robot.hello, Robot.do_set_mode, Robot.store, Robot.note = hello_of_less, set_manual, store, lambda *_, **__: None
+del Robot.do_set_setpoint, Robot.do_set_duty_schedule, Robot.do_inject_disturbance, Robot.do_zero_position
 def only_signs_of_life(connection):
     return {"heartbeat": pb.Heartbeat()} if connection.robot.now_us() - connection.sent_us >= connection.heartbeat_us else None
 Connection.next_status = only_signs_of_life
@@ -134,7 +136,7 @@ class ExampleRobotTest(unittest.TestCase):
         self.assert_nothing_moves(stopped["effect_at_robot_us"])
 
         with self.assertRaises(ApiError) as refused:
-            station.command("cart-1", "set_duty_schedule", schedule=[{"tick": 0, "duty": 0.1}, {"tick": 10, "duty": 0}])
+            station.command("cart-1", "set_parameter", name="kp", value=1)
         self.assertEqual(refused.exception.reason, "unsupported")
         station.command("cart-1", "zero_position")
         wait_until(lambda: abs(self.robot()["sample"]["position_m"]) < 0.005, PATIENCE_S, "its place is the new 0")
@@ -219,12 +221,30 @@ class ExampleRobotTest(unittest.TestCase):
         with self.assertRaises(ApiError) as refused:
             station.command("cart-1", "set_mode", mode="auto", setpoint_m=0.1)
         self.assertEqual(refused.exception.reason, "unsupported")
+        self.assertIn("is aborted: zero_position: rejected unsupported", self.experiment().stdout)
         stopped = station.post("/api/v1/robots/cart-1/emergency-stop")
         self.verified("clear_emergency", emergency_id=stopped["emergency_id"])
         self.verified("set_mode", mode="manual")
         self.assert_nothing_moves(stopped["effect_at_robot_us"])
         self.assertIsNone(self.robot()["status"])
         self.assert_all_is_recorded()
+
+    def experiment(self):
+        return self.place.tool("experiment", "begin", "figure_5", "--robot", "cart-1", "--wait", "--data", self.place.data)
+
+    def test_an_experiment_finds_the_constants_of_the_cart(self):
+        station = self.started()
+        self.start_robot(station.endpoints["robots"])
+        for run in (1, 2, 3):  # a machine that stands still has an experiment aborted, as it must be
+            done = self.experiment()
+            if done.returncode == 0:
+                break
+        self.assertIn("is done", done.stdout, done.stderr)
+        wait_until(lambda: station.get(f"/api/v1/runs/{run}/certificate")["final"], PATIENCE_S, "all of the run on disk")
+        found = self.place.tool("identify", "--run", run, "--cut-at-gaps", "--json", "--data", self.place.data)
+        model = json.loads(found.stdout)["parameters"]
+        self.assertAlmostEqual(model["kp"], 0.3, places=4)
+        self.assertAlmostEqual(model["b2"], 0.2, places=4)
 
     def test_a_station_that_hangs_is_dialled_again(self):
         self.started()
