@@ -20,4 +20,4 @@ pkg_check_modules(systemd REQUIRED IMPORTED_TARGET libsystemd)
 pkg_check_modules(minizip REQUIRED IMPORTED_TARGET minizip)
 find_program(PROTOC protoc REQUIRED)
 find_program(PROTOC_GEN_NANOPB protoc-gen-nanopb REQUIRED)
-find_program(PYTHON3 python3 REQUIRED)  # checks in tests/ use its standard library only
+find_program(PYTHON3 python3 REQUIRED)  # checks in tests/ use its standard library; system_example_robot more

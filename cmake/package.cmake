@@ -47,6 +47,10 @@ install(FILES ${PROJECT_SOURCE_DIR}/README.md ${PROJECT_SOURCE_DIR}/CHANGELOG.md
   ${package_files}/sbom.cdx.json ${package_files}/copyright DESTINATION share/doc/rheonaut)
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/docs/ DESTINATION share/doc/rheonaut/docs FILES_MATCHING PATTERN "*.md" PATTERN "*.svg"
   PATTERN decisions EXCLUDE PATTERN images EXCLUDE)
+# A robot of one's own, beside the page that explains it.
+install(PROGRAMS ${PROJECT_SOURCE_DIR}/examples/robot.py DESTINATION share/doc/rheonaut/examples)
+install(FILES ${PROJECT_SOURCE_DIR}/examples/station_link.py DESTINATION share/doc/rheonaut/examples)
+install(FILES ${PROJECT_SOURCE_DIR}/protocol/robot.proto DESTINATION share/doc/rheonaut/protocol)
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/deploy/proxy ${PROJECT_SOURCE_DIR}/deploy/prometheus
   ${PROJECT_SOURCE_DIR}/deploy/grafana DESTINATION share/doc/rheonaut/deploy)
 install(PROGRAMS ${debian}/backup-daily DESTINATION libexec/rheonaut)

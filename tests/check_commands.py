@@ -2,7 +2,7 @@
 """Checks that each command in the documents parses: its names and options are those of the programs' own --help.
 
 Commands are lines of code blocks, and code in backquotes, that call `rheonaut`, `rheonaut-sim` (with or without the
-folder they were built in), or a script in deploy/ or tests/bench. Of a script the options must stand in its text.
+folder they were built in), or a script in deploy/, tests/bench or examples/. Of a script the options must stand in its text.
 The programs are in RHEONAUT_BIN. Prints `file:line: what is wrong` and fails if anything is. What can run without a
 station is run by tests/server/cli/documented_commands_test.py.
 """
@@ -90,7 +90,7 @@ def simple_commands(line):
 
 
 def is_script(word):
-    return re.fullmatch(r"(deploy|tests/bench|\.ci)/[\w-]+", word) is not None
+    return re.fullmatch(r"((deploy|tests/bench|\.ci)/[\w-]+|examples/\w+\.py)", word) is not None
 
 
 def faults_of_line(root, line):
@@ -131,7 +131,7 @@ def documents(root):
 def faults(root):
     for name, text in documents(root):
         for number, code in lines_of_code(text):
-            if re.search(r"rheonaut|deploy/|tests/bench/", code):
+            if re.search(r"rheonaut|deploy/|tests/bench/|examples/", code):
                 yield from (f"{name}:{number}: {fault}" for fault in faults_of_line(root, code) if fault)
 
 

@@ -32,7 +32,8 @@ SMALL_TREE = {
     "tests/fuzz/frame_fuzz.cpp": '#include "protocol/frame.hpp"\n',
     "tests/system/processes.py": "",
     "tests/system/kill_test.py": "from processes import lab\n",
-    "tests/system/proxy_test.py": "import os\n",
+    "tests/system/proxy_test.py": "import os\nfrom cart import Cart\n",
+    "examples/cart.py": "",
     "tests/browser/programs.mjs": "",
     "tests/browser/escape_test.mjs": "import { run } from './programs.mjs';\n",
 }
@@ -92,6 +93,7 @@ class ReachTest(unittest.TestCase):
         self.expect("tests/system/kill_test.py", {"test system_kill"})
         self.expect("tests/system/processes.py", {"test system_kill"})
         self.expect("tests/browser/programs.mjs", {"test browser_escape"})
+        self.expect("examples/cart.py", {"test system_proxy"})
 
     def test_the_page_reaches_its_own_tests_and_the_browsers(self):
         self.expect("web/src/api.ts", {"test web", "test browser_escape"})

@@ -32,6 +32,7 @@ const sidebar = [
       page('Hardware', 'hardware'),
       page('Many robots', 'fleet'),
       page('When one station is not enough', 'scale'),
+      page('Your own robot', 'your_own_robot'),
       page('Simulated robot', 'simulator'),
       page('Scenarios', 'scenarios'),
       page('Network faults', 'network_faults'),

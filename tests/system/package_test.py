@@ -86,6 +86,8 @@ class PackageTest(unittest.TestCase):
         for page in ("rheonaut", "rheonaut-serve", "rheonaut-stop", "rheonaut-sim"):
             self.assertTrue(self.path(f"/usr/share/man/man1/{page}.1.gz").exists(), page)
         self.assertIn("_rheonaut", self.path("/usr/share/bash-completion/completions/rheonaut").read_text())
+        for name in ("examples/robot.py", "examples/station_link.py", "protocol/robot.proto", "docs/your_own_robot.md"):
+            self.assertTrue(self.path(f"/usr/share/doc/rheonaut/{name}").exists(), name)
         self.assertIn("preact", self.path("/usr/share/doc/rheonaut/copyright").read_text())
         # HDF5, and what it pulls, is loaded by the program that writes export files alone.
         self.assertNotIn("hdf5", self.tree.run("ldd", "/usr/bin/rheonaut").stdout)

@@ -89,29 +89,38 @@ SQLite::Database open_checked(const std::filesystem::path& path) {
   }
 }
 
-}  // namespace
-
-Database::Database(const std::filesystem::path& path, BeforeMigration before) : handle_{open_checked(path)} {
-  if (sodium_init() < 0) throw std::runtime_error{"libsodium cannot be initialised: the system gives no random bytes"};
-  settle();
-  if (const auto problem = file_problem(path)) refuse(path, *problem);  // what the log held is in the file now
-  migrate(path, before);
-  settle();  // the schema and the store's identity are in the file, whatever becomes of its log
-  store_id_ = unsigned_id(handle_.execAndGet("SELECT value FROM meta WHERE name = 'store_id'"));
-  restored_at_us_ = handle_.execAndGet("SELECT coalesce(max(value), 0) FROM meta WHERE name = 'restored_at_us'");
-}
-
 // What a kill has left in the write-ahead log can be read, but the disk may not hold it yet, and robots will be told
 // that it is durable. And a log that goes on where a power cut has left it goes on inside a sector that holds a commit.
 // So it begins anew, after a checkpoint, which first syncs it (so when there is no room for the rest, that is done).
-void Database::settle() {
+void settle(SQLite::Database& database) {
   const int result =
-      sqlite3_wal_checkpoint_v2(handle_.getHandle(), nullptr, SQLITE_CHECKPOINT_TRUNCATE, nullptr, nullptr);
+      sqlite3_wal_checkpoint_v2(database.getHandle(), nullptr, SQLITE_CHECKPOINT_TRUNCATE, nullptr, nullptr);
   if (result == SQLITE_BUSY) {  // another program is reading the log: it stays, and a commit syncs it
-    handle_.exec(fmt::format("PRAGMA user_version = {}", pragma(handle_, "user_version")));
+    database.exec(fmt::format("PRAGMA user_version = {}", pragma(database, "user_version")));
   } else if (result != SQLITE_OK && result != SQLITE_FULL) {
-    throw SQLite::Exception{handle_.getHandle(), result};
+    throw SQLite::Exception{database.getHandle(), result};
   }
+}
+
+// The file is checked again when what the log held is in it. No handle is open then: when a process closes any
+// descriptor of a file, POSIX drops all locks that it has on the file. A handle that has lost its lock does not keep
+// another program, when that closes the database, from removing the log into which the station goes on to commit.
+SQLite::Database open_settled(const std::filesystem::path& path) {
+  {
+    SQLite::Database database = open_checked(path);
+    settle(database);
+  }
+  return open_checked(path);
+}
+
+}  // namespace
+
+Database::Database(const std::filesystem::path& path, BeforeMigration before) : handle_{open_settled(path)} {
+  if (sodium_init() < 0) throw std::runtime_error{"libsodium cannot be initialised: the system gives no random bytes"};
+  migrate(path, before);
+  settle(handle_);  // the schema and the store's identity are in the file, whatever becomes of its log
+  store_id_ = unsigned_id(handle_.execAndGet("SELECT value FROM meta WHERE name = 'store_id'"));
+  restored_at_us_ = handle_.execAndGet("SELECT coalesce(max(value), 0) FROM meta WHERE name = 'restored_at_us'");
 }
 
 void Database::migrate(const std::filesystem::path& path, BeforeMigration before) {

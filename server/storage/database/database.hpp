@@ -31,7 +31,6 @@ class Database {
   void checkpoint();
 
  private:
-  void settle();
   void migrate(const std::filesystem::path& path, BeforeMigration before);
 
   SQLite::Database handle_;

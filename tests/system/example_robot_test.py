@@ -1,0 +1,289 @@
+"""examples/robot.py with a real station, in real time: driven, stopped and cleared; every sample there once after a cut link
+and after the station's death; a command that comes too late; TLS and a token."""
+import json
+import signal
+import socket
+import subprocess
+import sys
+import time
+import unittest
+
+from example_robot import EXAMPLES  # first: it may go on in another Python
+
+from processes import ApiError, commanded, lab, wait_until
+from recording_audit import audit
+
+PATIENCE_S = 60  # far beyond what any step takes: the tests judge order and outcome
+PATIENT_LINK = "[robots]\nlink_timeout_ms = 5000\n"  # a machine that stands still for a second is no lost link
+OUTAGE_S = 8
+# The same robot without events, status, stop probes, auto and all that docs/protocol.md lets a robot leave out.
+LESS = """
+import sys
+sys.path.insert(0, sys.argv.pop(1))
+from robot import Robot, check, main, pb
+from station_link import Connection
+hello, set_mode = Robot.hello, Robot.do_set_mode
+def hello_of_less(robot):
+    message = hello(robot)
+    message.answers_stop_probes = False
+    return message
+def set_manual(robot, wanted, *rest):
+    check(wanted.mode == pb.MODE_MANUAL, "unsupported")
+    set_mode(robot, wanted, *rest)
+def store(*_):
+    check(False, "unsupported")
+Robot.hello, Robot.do_set_mode, Robot.store, Robot.note = hello_of_less, set_manual, store, lambda *_, **__: None
+del Robot.do_set_setpoint, Robot.do_set_duty_schedule, Robot.do_inject_disturbance, Robot.do_zero_position
+def only_signs_of_life(connection):
+    return {"heartbeat": pb.Heartbeat()} if connection.robot.now_us() - connection.sent_us >= connection.heartbeat_us else None
+Connection.next_status = only_signs_of_life
+main()
+"""
+
+
+class ExampleRobotTest(unittest.TestCase):
+    """With a real station, in real time."""
+
+    def started(self):
+        self.place = self.enterContext(lab(config=PATIENT_LINK))
+        self.station = self.place.start_station()
+        return self.station
+
+    def start_robot(self, address, *flags, program=(EXAMPLES / "robot.py",)):
+        robot = self.begin_robot(address, *flags, program=program)
+        self.station.wait_for_robot("cart-1", PATIENCE_S)
+        return robot
+
+    def begin_robot(self, address, *flags, program=(EXAMPLES / "robot.py",), robot_id="cart-1"):
+        return self.place._start(robot_id, sys.executable, "-B", *program, "--station", address, "--id", robot_id, *flags)
+
+    def robot(self):
+        return self.station.robot("cart-1")
+
+    def verified(self, kind, **arguments):
+        """The station has seen the command's effect in the robot's telemetry. What a machine that stood still has let end
+        too early, such as a lease, is given again."""
+        def is_verified():
+            command_id = commanded(self.station, kind, "cart-1", **arguments)["command_id"]
+            return wait_until(lambda: self.ended(command_id), PATIENCE_S, f"{kind} ends")["state"] == "verified"
+        wait_until(is_verified, PATIENCE_S, f"{kind} verified")
+
+    def ended(self, command_id):
+        record = self.station.get(f"/api/v1/commands/{command_id}")
+        return record if record["ended_at_us"] else None
+
+    def more_samples(self, count=100):
+        seen = self.robot()["next_seq"]
+        wait_until(lambda: self.robot()["next_seq"] > seen + count, PATIENCE_S, f"{count} more samples")
+
+    def event(self, kind):
+        events = self.station.get("/api/v1/robots/cart-1/events?limit=1000")["events"]
+        return next((event for event in events if event["kind"] == kind), None)
+
+    def samples_from(self, first_seq, robot_time_us=0):
+        """Of the boot, from this number and this time on, to the latest."""
+        robot = self.robot()
+        span = {"boot_id": robot["boot_id"], "first_seq": first_seq, "last_seq": robot["next_seq"] - 1}
+        run = self.station.post("/api/v1/runs", {"robot_id": "cart-1", "name": "look", "span": span})["run_id"]
+        wait_until(lambda: self.station.get(f"/api/v1/runs/{run}/certificate")["final"], PATIENCE_S, "all of it on disk")
+        samples = self.station.get(f"/api/v1/runs/{run}/samples?limit=10000")["samples"]
+        self.assertEqual([sample["seq"] for sample in samples], list(range(first_seq, robot["next_seq"])))
+        return [sample for sample in samples if sample["robot_time_us"] >= robot_time_us]
+
+    def assert_nothing_moves(self, robot_time_us):
+        """From this time of the robot on, in each of more than 50 samples."""
+        self.more_samples(50)
+        duties = [sample["duty"] for sample in self.samples_from(0, robot_time_us)]
+        self.assertGreater(len(duties), 50)
+        self.assertEqual(set(duties), {0.0})
+
+    def assert_all_is_recorded(self):
+        """Every number of the one boot is there once. Ends the station."""
+        made = self.robot()["next_seq"]
+        wait_until(lambda: self.robot()["durable_next_seq"] >= made, PATIENCE_S, "what was made until now is on disk")
+        wait_until(lambda: self.robot()["oldest_seq"] >= made, PATIENCE_S, "the robot has dropped what is on disk")
+        self.assertEqual(self.place.stop_station(), 0)
+        faults, stored, lost = audit(self.place.data / "station.sqlite")
+        self.assertEqual((faults, lost), ([], 0))
+        self.assertGreaterEqual(stored, made)
+
+    def test_it_is_driven_stopped_and_cleared(self):
+        station = self.started()
+        robot = self.start_robot(station.endpoints["robots"])
+        self.assertIsNone(self.robot()["sample"]["impedance_mv"], "it has no such sensor")
+        wait_until(lambda: self.robot()["stop_path"]["is_open"], PATIENCE_S, "the way of a stop is open")
+        wait_until(lambda: self.robot()["clock"], PATIENCE_S, "its clock is known")
+
+        self.verified("set_duty", duty=0.4)
+        lapsed = wait_until(lambda: self.event("lease_lapsed"), PATIENCE_S, "the lease lapses")
+        self.assertAlmostEqual(lapsed["value"], 0.4, places=6)
+        self.assertGreater(self.robot()["sample"]["position_m"], 0.01)
+        self.assert_nothing_moves(lapsed["robot_time_us"])
+
+        self.verified("set_mode", mode="auto", setpoint_m=0.2)
+        wait_until(lambda: abs(self.robot()["sample"]["position_m"] - 0.2) < 0.002, PATIENCE_S, "it is there")
+        self.verified("set_setpoint", setpoint_m=-0.5)
+        wait_until(lambda: self.robot()["sample"]["velocity_m_s"] < -0.1, PATIENCE_S, "it moves")
+        stopped = station.post("/api/v1/robots/cart-1/emergency-stop")
+        ended = wait_until(lambda: self.ended(stopped["command_id"]), PATIENCE_S, "the stop has an end")
+        self.assertEqual(ended["state"], "verified")
+        self.assertEqual(self.robot()["mode"], "emergency")
+        with self.assertRaises(ApiError) as refused:
+            station.command("cart-1", "set_duty", duty=0.1)
+        self.assertEqual(refused.exception.reason, "latched")
+        self.verified("clear_emergency", emergency_id=self.robot()["emergency_id"])
+        self.assertEqual((self.robot()["mode"], self.robot()["setpoint_m"]), ("manual", None))
+        self.assert_nothing_moves(stopped["effect_at_robot_us"])
+
+        with self.assertRaises(ApiError) as refused:
+            station.command("cart-1", "set_parameter", name="kp", value=1)
+        self.assertEqual(refused.exception.reason, "unsupported")
+        station.command("cart-1", "zero_position")
+        wait_until(lambda: abs(self.robot()["sample"]["position_m"]) < 0.005, PATIENCE_S, "its place is the new 0")
+        self.assert_all_is_recorded()
+        robot.send_signal(signal.SIGTERM)
+        self.assertEqual(robot.wait(timeout=PATIENCE_S), 0, "it ends in order")
+
+    def test_a_command_that_comes_too_late_is_refused_and_moves_nothing(self):
+        station = self.started()
+        robot = self.start_robot(station.endpoints["robots"])
+        robot.send_signal(signal.SIGSTOP)  # what is sent to it now waits in its socket
+        try:
+            with self.assertRaises(ApiError) as unanswered:
+                station.command("cart-1", "set_duty", duty=0.5, life_ms=200)
+            self.assertEqual(unanswered.exception.status, 504)
+            command_id = station.get("/api/v1/robots/cart-1/commands?limit=1")["commands"][0]["command_id"]
+        finally:
+            robot.send_signal(signal.SIGCONT)
+        def answer():
+            record = self.station.get(f"/api/v1/commands/{command_id}")
+            return record if record["state"] not in ("sent", "unknown") else None
+        late = wait_until(answer, PATIENCE_S, "its late answer")
+        self.assertEqual((late["state"], late["reason"], late["effect_at_robot_us"]), ("expired", "expired", None))
+        wait_until(lambda: self.robot()["status"]["missed_ticks"] > 100, PATIENCE_S, "it counts the ticks of that second")
+        self.assert_nothing_moves(0)
+
+    def test_after_a_cut_link_every_sample_is_there_once(self):
+        station = self.started()
+        proxy = subprocess.Popen([self.place.bin / "rheonaut-sim", "proxy", "--to", station.endpoints["robots"]],
+                                 stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, bufsize=1)
+        self.addCleanup(proxy.communicate)
+        self.addCleanup(proxy.terminate)
+        address = proxy.stdout.readline().split()[-1]
+        self.start_robot(address)
+        self.verified("set_mode", mode="auto", setpoint_m=1.0)
+        wait_until(lambda: self.robot()["sample"]["velocity_m_s"] > 0.1, PATIENCE_S, "it moves")
+        print("outage", OUTAGE_S, file=proxy.stdin, flush=True)
+        wait_until(lambda: self.robot()["link"] == "disconnected", PATIENCE_S, "the link is cut")
+        wait_until(lambda: self.robot()["link"] == "connected", PATIENCE_S, "the robot has dialled again")
+        self.more_samples()
+        lost = wait_until(lambda: self.event("link_lost"), PATIENCE_S, "it noticed")
+        self.assertEqual((self.robot()["mode"], self.robot()["setpoint_m"]), ("manual", None))
+        self.assert_nothing_moves(lost["robot_time_us"])
+        flags = {sample["flags"] for sample in self.samples_from(0)}
+        self.assertTrue({flag for flag in flags if flag & 1 and flag & 4}, f"backfill of the time without link: {flags}")
+        self.assert_all_is_recorded()
+
+    def test_a_station_that_was_killed_misses_no_sample(self):
+        station = self.started()
+        ports = station.endpoints
+        self.start_robot(ports["robots"])
+        before = self.robot()
+        for _ in range(2):
+            self.more_samples()
+            self.place.kill_station()
+            time.sleep(2)  # the outage is the input of this test
+            self.station = self.place.start_station(http=ports["http"], robots=ports["robots"])
+            self.station.wait_for_robot("cart-1", PATIENCE_S)
+        self.assertEqual(self.robot()["boot_id"], before["boot_id"])
+        self.assert_all_is_recorded()
+
+    def test_a_robot_that_lost_its_latch_is_stopped_again_when_it_returns(self):
+        station = self.started()
+        robot = self.start_robot(station.endpoints["robots"])
+        boot = self.robot()["boot_id"]
+        station.post("/api/v1/robots/cart-1/emergency-stop")
+        robot.kill()
+        robot.wait()
+        self.start_robot(station.endpoints["robots"])
+        again = wait_until(lambda: self.robot()["mode"] == "emergency" and self.robot()["boot_id"] != boot, PATIENCE_S,
+                           "it is latched in its new boot")
+        self.assertTrue(again)
+        self.assert_nothing_moves(0)
+
+    def test_a_robot_that_has_less(self):
+        station = self.started()
+        self.start_robot(station.endpoints["robots"], program=("-c", LESS, EXAMPLES))
+        self.assertIsNone(self.robot()["stop_path"])
+        for part, content in (("parameters", "parameters"), ("controller", "controller")):
+            self.assertIsNone(station.get(f"/api/v1/robots/cart-1/{part}")[content])
+        self.verified("set_duty", duty=0.3)
+        with self.assertRaises(ApiError) as refused:
+            station.command("cart-1", "set_mode", mode="auto", setpoint_m=0.1)
+        self.assertEqual(refused.exception.reason, "unsupported")
+        self.assertIn("is aborted: zero_position: rejected unsupported", self.experiment().stdout)
+        stopped = station.post("/api/v1/robots/cart-1/emergency-stop")
+        self.verified("clear_emergency", emergency_id=stopped["emergency_id"])
+        self.verified("set_mode", mode="manual")
+        self.assert_nothing_moves(stopped["effect_at_robot_us"])
+        self.assertIsNone(self.robot()["status"])
+        self.assert_all_is_recorded()
+
+    def experiment(self):
+        return self.place.tool("experiment", "begin", "figure_5", "--robot", "cart-1", "--wait", "--data", self.place.data)
+
+    def test_an_experiment_finds_the_constants_of_the_cart(self):
+        station = self.started()
+        self.start_robot(station.endpoints["robots"])
+        for run in (1, 2, 3):  # a machine that stands still has an experiment aborted, as it must be
+            done = self.experiment()
+            if done.returncode == 0:
+                break
+        self.assertIn("is done", done.stdout, done.stderr)
+        wait_until(lambda: station.get(f"/api/v1/runs/{run}/certificate")["final"], PATIENCE_S, "all of the run on disk")
+        found = self.place.tool("identify", "--run", run, "--cut-at-gaps", "--json", "--data", self.place.data)
+        model = json.loads(found.stdout)["parameters"]
+        self.assertAlmostEqual(model["kp"], 0.3, places=4)
+        self.assertAlmostEqual(model["b2"], 0.2, places=4)
+
+    def test_a_station_that_hangs_is_dialled_again(self):
+        self.started()
+        with socket.create_server(("127.0.0.1", 0)) as hanging:
+            hanging.settimeout(PATIENCE_S)
+            self.begin_robot("127.0.0.1:%d" % hanging.getsockname()[1])
+            first, _ = hanging.accept()
+            with first, hanging.accept()[0] as second:
+                self.assertIn(b"cart-1", second.recv(1024), "its Hello")
+                self.assertIn(b"cart-1", first.recv(1024), "and the first connection was one of the robot's, too")
+        wait_until(lambda: "no answer" in self.place.log("cart-1"), PATIENCE_S, "it says so")
+
+    def other_authority(self):
+        with lab() as other:
+            self.assertEqual(other.tool("certificate", "--data", other.data).returncode, 0)
+            copy = self.place.folder / "other-ca.crt"
+            copy.write_bytes((other.data / "tls" / "lab-ca.crt").read_bytes())
+        return copy
+
+    def test_over_tls_with_a_token(self):
+        with lab() as place:
+            self.place = place
+            self.assertEqual(place.tool("certificate", "--data", place.data).returncode, 0)
+            self.station = place.start_station(config=f'{PATIENT_LINK}enrol_on_loopback = false\n[tls]\nmode = "on"\n')
+            address = self.station.endpoints["robots"]
+            token = place.folder / "cart-1.token"
+            enrolled = place.tool("robot", "enroll", "cart-1", "--json", "--data", place.data)
+            token.write_text(json.loads(enrolled.stdout)["secret"])
+            trusted = ("--tls-ca", place.data / "tls" / "lab-ca.crt")
+            self.start_robot(address, *trusted, "--token-file", token)
+            self.verified("set_duty", duty=0.1)
+            self.assertEqual(self.place.log("cart-1").count("connected to"), 1)
+            for robot_id, why, flags in (("stranger", "robot 'stranger' is not enrolled", trusted),
+                                         ("plain", f"{address}: ", ()),  # reset or closed, as it happens
+                                         ("deceived", "CERTIFICATE_VERIFY_FAILED", ("--tls-ca", self.other_authority()))):
+                self.begin_robot(address, *flags, robot_id=robot_id)
+                wait_until(lambda: why in place.log(robot_id), PATIENCE_S, f"'{why}' of {robot_id}")
+                self.assertNotIn("connected to", place.log(robot_id))
+
+
+if __name__ == "__main__":
+    unittest.main()
