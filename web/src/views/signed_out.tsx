@@ -3,7 +3,11 @@
 import { useSignal } from '@preact/signals';
 import type { Session } from '../session';
 
-const kMakeLink = 'rheonaut login-link --data FOLDER';
+const MakeLink = () => (
+  <p>
+    <code>rheonaut login-link --data FOLDER</code>
+  </p>
+);
 
 // The station answers a link that is no longer valid with this page, at the link's own address.
 function OldLink() {
@@ -11,9 +15,9 @@ function OldLink() {
     <>
       <h1>This link is no longer valid</h1>
       <p>
-        A link signs one browser in, once, and only within 10 minutes. On the station’s machine <code>{kMakeLink}</code>{' '}
-        makes a new one; FOLDER is the station’s data folder.
+        A link signs one browser in, once, and only within 10 minutes. On the station’s machine this makes a new one:
       </p>
+      <MakeLink />
     </>
   );
 }
@@ -24,8 +28,9 @@ function NoLink() {
       <h1>Open the link that the station printed</h1>
       <p>
         This browser is not signed in. The station printed a one-time link when it started; it looks like{' '}
-        <code>{location.origin}/login?code=…</code>. On the station’s machine <code>{kMakeLink}</code> makes another.
+        <code>{location.origin}/login?code=…</code>. On the station’s machine this makes another:
       </p>
+      <MakeLink />
     </>
   );
 }
