@@ -41,15 +41,9 @@ std::size_t edit_distance(const std::string& a, const std::string& b) {
   return row[b.size()];
 }
 
-std::string list(std::span<const std::string> names) {
-  std::string all;
-  for (const std::string& name : names) all += (all.empty() ? "" : ", ") + name;
-  return all;
-}
-
 std::string one_of(const std::string& given, std::span<const std::string> names) {
   const std::string near = nearest(given, names);
-  return near.empty() ? "there are " + list(names) : "did you mean '" + near + "'? There are " + list(names);
+  return near.empty() ? "there are " + list_of(names) : "did you mean '" + near + "'? There are " + list_of(names);
 }
 
 std::string cut(const std::string& text) {
@@ -70,6 +64,17 @@ std::string nearest(const std::string& text, std::span<const std::string> names)
     best = name;
   }
   return best;
+}
+
+std::string did_you_mean(const std::string& text, std::span<const std::string> names) {
+  const std::string near = nearest(text, names);
+  return near.empty() ? "" : "; did you mean " + near + "?";
+}
+
+std::string list_of(std::span<const std::string> names) {
+  std::string all;
+  for (const std::string& name : names) all += (all.empty() ? "" : ", ") + name;
+  return all;
 }
 
 FieldReader::FieldReader(const toml::table& table, const std::string& origin, std::string path)
@@ -149,7 +154,7 @@ void FieldReader::choice(const char* key, std::size_t& index, std::span<const ch
   if (node == nullptr) return;
   const std::vector<std::string> known(names.begin(), names.end());
   if (!node->is_string())
-    fail(*node, key, "must be a text in quotes, is " + shown(*node) + "; there are " + list(known));
+    fail(*node, key, "must be a text in quotes, is " + shown(*node) + "; there are " + list_of(known));
   const std::string& given = node->as_string()->get();
   const auto found = std::ranges::find(known, given);
   if (found == known.end()) fail(*node, key, "there is no '" + cut(given) + "'; " + one_of(given, known));

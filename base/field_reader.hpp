@@ -49,5 +49,9 @@ class FieldReader final : public Fields {
 
 // One of the names that is nearly the text, or empty when none is.
 std::string nearest(const std::string& text, std::span<const std::string> names);
+// "; did you mean figure_7?" of the nearest one, or empty.
+std::string did_you_mean(const std::string& text, std::span<const std::string> names);
+// "a, b, c".
+std::string list_of(std::span<const std::string> names);
 
 }  // namespace base

@@ -60,7 +60,7 @@ static int serve(const config::Config& config) {
   tasks.spawn("experiments", experiments.run());
   tasks.spawn("signals", tasks.stop_on_signal());
   tasks.spawn("security", security.run());
-  tasks.spawn("announcement", folder.announce(clock, {api.address(), options.robots_address, security.to_trust()}));
+  tasks.spawn("announcement", folder.announce(clock, api.announcement()));
   tasks.spawn("supervision", config::tell_supervisor(clock, "page " + api.url()));
   api.say_ready(options.robots_address, config.data_dir);
   tasks.run(clock);   // returns when every task has ended

@@ -20,7 +20,7 @@
 namespace {
 
 constexpr const char* kExamples = R"(Examples:
-  rheonaut-sim --station 127.0.0.1:7070                        one robot in the fabric softener
+  rheonaut-sim --data rheonaut-data                            one robot in the fabric softener, here
   rheonaut-sim --station 127.0.0.1:7070 --scenario bad_day     the same robot on a bad day
   rheonaut-sim --station 127.0.0.1:7070 --scenario mine.toml --faults 127.0.0.1:7400 --duration-s 60
   curl -H 'Content-Type: application/json' -d '{"fault":"electrode_offset","offset_mv":40,"for_s":5}' \
@@ -70,6 +70,9 @@ int main(int argc, char** argv) try {
     return run.run();
   } catch (const CLI::ParseError& error) {
     return base::command_line::answer(app, error);
+  } catch (const std::invalid_argument& error) {  // a value that is not allowed
+    std::cerr << "rheonaut-sim: " << error.what() << '\n';
+    return base::command_line::kUsageError;
   }
 } catch (const std::exception& error) {
   std::cerr << "rheonaut-sim: " << error.what() << '\n';

@@ -16,6 +16,7 @@ void add_reference_flags(CLI::App& app, const std::string& version, const std::v
     std::cout << completion_script(app, shell) << std::flush;
     throw CLI::Success{};
   };
+  app.set_version_flag("--version", version, "Print the version and exit");
   app.add_flag_callback("--man", print_manual, "Print the manual page, for man(1)");
   app.add_option_function<std::string>("--completion", print_completion, "Print the completion script for a shell")
       ->check(CLI::IsMember({"bash", "zsh", "fish"}));

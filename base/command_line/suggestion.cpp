@@ -12,8 +12,10 @@ namespace base::command_line {
 namespace {
 
 constexpr const char* kDidYouMean = ", did you mean ";
+constexpr std::size_t kLongBeginning = 6;  // letters that may be the beginning of a word
 
-std::size_t distance(std::string_view a, std::string_view b) {
+// From a to each beginning of b, from the empty one to b itself.
+std::vector<std::size_t> distances(std::string_view a, std::string_view b) {
   std::vector<std::size_t> before(b.size() + 1), last(b.size() + 1), row(b.size() + 1);
   std::iota(last.begin(), last.end(), std::size_t{0});
   for (std::size_t i = 1; i <= a.size(); ++i) {
@@ -24,7 +26,7 @@ std::size_t distance(std::string_view a, std::string_view b) {
     }
     before = std::exchange(last, row);
   }
-  return last.back();
+  return last;
 }
 
 std::string printable(std::string_view text) {
@@ -57,6 +59,29 @@ std::string with_suggestion(const std::string& what, std::string_view misspelt, 
   return found.empty() ? what : what + kDidYouMean + found;
 }
 
+// Of a value that is none of some words. CLI11 says "--fluid: watr not in {water,oil}" where a validator of ours says
+// "--fluid must be one of water, oil, is 'watr'".
+std::string about_value(std::string what) {
+  constexpr std::string_view kNotIn = " not in {", kMust = " must be one of ", kIs = ", is '";
+  if (const std::size_t braces = what.find(kNotIn); braces != std::string::npos && what.ends_with('}')) {
+    const std::size_t colon = what.rfind(": ", braces);
+    if (colon == std::string::npos) return what;
+    std::string words = what.substr(braces + kNotIn.size(), what.size() - braces - kNotIn.size() - 1);
+    for (std::size_t comma = 0; (comma = words.find(',', comma)) != std::string::npos; comma += 2)
+      words.insert(comma + 1, " ");
+    const std::string value = what.substr(colon + 2, braces - colon - 2);
+    what = what.substr(0, colon) + std::string{kMust} + words + std::string{kIs} + value + "'";
+  }
+  const std::size_t must = what.find(kMust), is = what.rfind(kIs);
+  if (must == std::string::npos || is == std::string::npos || is < must || !what.ends_with('\'')) return what;
+  std::vector<std::string> words{""};
+  for (const char c : what.substr(must + kMust.size(), is - must - kMust.size())) {
+    if (c == ',') words.emplace_back();
+    if (c != ',' && c != ' ') words.back() += c;
+  }
+  return with_suggestion(what, what.substr(is + kIs.size(), what.size() - is - kIs.size() - 1), words);
+}
+
 // Of a word that no command or option takes.
 std::string about_unknown(const CLI::App& at, const std::string& word, const CLI::Error& error) {
   const std::string name = word.substr(0, word.find('='));
@@ -79,7 +104,10 @@ std::string nearest(std::string_view misspelt, const std::vector<std::string>& w
   std::size_t best = 1 + letters / 3;  // farther is another word
   std::string found;
   for (const std::string& word : words) {
-    const std::size_t here = distance(misspelt, word);
+    const auto found_at = distances(misspelt, word);
+    std::size_t here = found_at.back();
+    // "--phase-margn" is a letter away from the beginning of "--phase-margin-deg", which is farther than a whole word.
+    if (letters >= kLongBeginning) here = std::min(here, 1 + *std::ranges::min_element(found_at));
     if (here < best || (here == best && found.empty() && letters > 1)) {
       best = here;
       found = word;
@@ -106,6 +134,7 @@ std::string complaint(const CLI::App& app, const CLI::Error& error) {
   if (const std::size_t colon = what.find(": must "); what.starts_with("--") && colon != std::string::npos) {
     what.erase(colon, 1);
   }
+  what = about_value(std::move(what));
   const bool is_question = what.find(kDidYouMean) != std::string::npos;
   return app.get_name() + ": " + printable(what) + (is_question ? "? See " : "; see ") + full_name(at) + " --help\n";
 }

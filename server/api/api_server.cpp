@@ -137,6 +137,11 @@ std::string ApiServer::url() const {
   return base_url(facts_, config::text(endpoint));
 }
 
+config::Announcement ApiServer::announcement() const {
+  const net::TransportSecurity& security = *facts_.security;
+  return {address(), facts_.robots_address, security.to_trust(security.http()), security.to_trust(security.robots())};
+}
+
 std::string ApiServer::login_url() { return api::login_url(url(), auth_.new_login_code()); }
 
 }  // namespace server::api

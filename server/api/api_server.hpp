@@ -13,6 +13,7 @@
 #include "server/api/live_messages.hpp"
 #include "server/api/routes/routes.hpp"
 #include "server/config/config.hpp"
+#include "server/config/data_folder.hpp"
 #include "server/http/http_server.hpp"
 #include "server/identity/auth.hpp"
 #include "server/identity/logins.hpp"
@@ -50,6 +51,7 @@ class ApiServer {
   std::uint16_t port() const { return listener_.endpoint().port(); }
   std::string address() const;  // "127.0.0.1:8080"
   std::string url() const;      // "https://127.0.0.1:8080", for a browser on this machine
+  config::Announcement announcement() const;
   const http::Router& router() const { return router_; }
   std::string login_url();  // a link that lets one page in, for 10 minutes
   // In the log, and with a link on standard output for the person at the console.

@@ -64,7 +64,7 @@ const std::vector<std::pair<const char*, std::vector<std::string_view>>> kGroups
      {"export", "reference", "metrics", "compare", "impedance-map", "report", "capsule", "reproduce", "job"}},
     {"Models and controllers",
      {"model", "bode", "step", "identify", "estimator", "tune", "discretise", "predict", "design"}},
-    {"Accounts", {"user", "token"}},
+    {"Accounts", {"login-link", "user", "token"}},
     {"This program", {"completion", "man"}}};
 
 const std::set<std::string_view> kFileOptions{"answers", "config", "csv",   "duty-csv",  "motor-csv",
@@ -85,6 +85,14 @@ void name_values(CLI::App& command) {
     }
   }
   for (CLI::App* one : command.get_subcommands({})) name_values(*one);
+}
+
+// Every command answers --version, which only the program's own --help lists.
+void add_version(CLI::App& command) {
+  for (CLI::App* one : command.get_subcommands({})) {
+    one->set_version_flag("--version", base::version())->group("");
+    add_version(*one);
+  }
 }
 
 template <class T>
@@ -122,6 +130,7 @@ void define_command_line(CLI::App& app, CommandLine& line) {
   offer<SupportBundle>(app, "support-bundle", "Gather what helps others to help, without secrets, in one zip file",
                        line);
   offer<Restore>(app, "restore", "Make a backup the database of a new data folder", line);
+  offer<LoginLink>(app, "login-link", "Make a one-time link that signs a browser in", line);
   offer<UserCommand>(app, "user", "Users of a station: add, list, change, remove", line);
   offer<TokenCommand>(app, "token", "API tokens of a station: create, list, revoke", line);
   offer<RobotCommand>(app, "robot", "Robots of a station: enroll, list, revoke", line);
@@ -164,6 +173,7 @@ void define_command_line(CLI::App& app, CommandLine& line) {
       "Example: rheonaut stop --data ~/lab");
   group(app);
   name_values(app);
+  add_version(app);
 }
 
 CommandLine parse_command_line(int argc, char** argv) {

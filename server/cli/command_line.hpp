@@ -38,6 +38,7 @@
 #include "server/cli/health/doctor.hpp"
 #include "server/cli/health/support_bundle.hpp"
 #include "server/cli/reference_pages.hpp"
+#include "server/cli/robots/login_link.hpp"
 #include "server/cli/robots/stop.hpp"
 #include "server/cli/robots/watch.hpp"
 #include "server/cli/terminal/output.hpp"
@@ -59,12 +60,13 @@ struct Answered {
   int exit_code = 0;
 };
 
-using CommandLine = std::variant<Answered, Serve, CheckConfig, Certificate, Backup, Restore, Verify, Export, Model,
-                                 Bode, Step, Identify, EstimatorQuestion, Tune, Discretise, Predict, UserCommand,
-                                 TokenCommand, RobotCommand, FluidCommand, JobCommand, DesignCommand, MetricsQuestion,
-                                 CompareQuestion, ImpedanceMapQuestion, ReportQuestion, CapsuleQuestion, Reproduce,
-                                 ReferenceCommand, ProfileQuestion, ExperimentCommand, Autotune, Demo, StopCommand,
-                                 WatchCommand, Doctor, SupportBundle, Commission, CompletionCommand, ManualCommand>;
+using CommandLine =
+    std::variant<Answered, Serve, CheckConfig, Certificate, Backup, Restore, Verify, Export, Model, Bode, Step,
+                 Identify, EstimatorQuestion, Tune, Discretise, Predict, UserCommand, TokenCommand, RobotCommand,
+                 FluidCommand, JobCommand, DesignCommand, MetricsQuestion, CompareQuestion, ImpedanceMapQuestion,
+                 ReportQuestion, CapsuleQuestion, Reproduce, ReferenceCommand, ProfileQuestion, ExperimentCommand,
+                 Autotune, Demo, StopCommand, WatchCommand, Doctor, SupportBundle, Commission, LoginLink,
+                 CompletionCommand, ManualCommand>;
 
 // The program with all its commands; the one that is chosen when `app` parses becomes `line`.
 void define_command_line(CLI::App& app, CommandLine& line);

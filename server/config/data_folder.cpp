@@ -65,6 +65,9 @@ DataFolder::~DataFolder() {
 asio::awaitable<void> DataFolder::announce(runtime::Clock& clock, Announcement announcement) {
   nlohmann::json content{{"http", announcement.http}, {"robots", announcement.robots}, {"pid", getpid()}};
   if (!announcement.tls_certificate.empty()) content["tls_certificate"] = announcement.tls_certificate;
+  if (!announcement.robots_tls_certificate.empty()) {
+    content["robots_tls_certificate"] = announcement.robots_tls_certificate;
+  }
   for (bool warned = false; !write_endpoints(content.dump() + '\n'); warned = true) {
     if (!warned) {
       spdlog::warn("'{}' cannot be written, programs on this machine do not find the station at {} until there is room",

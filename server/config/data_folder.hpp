@@ -36,9 +36,10 @@ class FolderLock {
 
 // Where the running station is, for other programs of its user.
 struct Announcement {
-  std::string http;             // "127.0.0.1:8080"
-  std::string robots;           // "127.0.0.1:7070"
-  std::string tls_certificate;  // of http; empty: it is plain
+  std::string http;                    // "127.0.0.1:8080"
+  std::string robots;                  // "127.0.0.1:7070"
+  std::string tls_certificate;         // of http; empty: it is plain
+  std::string robots_tls_certificate;  // the same of robots
 };
 
 class DataFolder {

@@ -327,13 +327,14 @@ Profile parse_profile(std::string_view text, const std::string& name) {
 }
 
 Profile find_profile(const std::string& name_or_file) {
-  std::string names;
+  std::vector<std::string> names;
   for (const base::EmbeddedFile& shipped : shipped_profiles()) {
     if (shipped.name == name_or_file) return parse_profile(shipped.content, std::string(shipped.name) + ".toml");
-    names += (names.empty() ? "" : ", ") + std::string(shipped.name);
+    names.emplace_back(shipped.name);
   }
   if (!std::filesystem::is_regular_file(name_or_file)) {
-    base::throw_invalid("there is no profile '", name_or_file, "', neither a file nor one of ", names);
+    base::throw_invalid("there is no profile '", name_or_file, "', neither a file nor one of ", base::list_of(names),
+                        base::did_you_mean(name_or_file, names));
   }
   std::ifstream stream{name_or_file, std::ios::binary};
   std::ostringstream text;

@@ -6,8 +6,11 @@
 #include <unistd.h>
 
 #include <csignal>
+#include <cstdio>
 #include <exception>
+#include <string_view>
 
+#include "base/version.hpp"
 #include "server/exporter/export_work.hpp"
 
 using namespace server;  // NOLINT: this file is the program, seen from outside
@@ -31,6 +34,7 @@ static void configure_sqlite() {
 }
 
 int main(int argc, char** argv) try {
+  if (argc == 2 && std::string_view{argv[1]} == "--version") return std::puts(base::version()) < 0 ? 1 : 0;
   configure_sqlite();
   std::signal(SIGPIPE, SIG_IGN);
   std::signal(SIGXFSZ, SIG_IGN);  // a file that may not grow is an error of write()

@@ -1,6 +1,7 @@
 // Binds, listens, accepts.
 #include "server/net/listener.hpp"
 
+#include <fmt/format.h>
 #include <spdlog/spdlog.h>
 #include <sys/resource.h>
 
@@ -8,6 +9,7 @@
 
 #include <boost/asio/as_tuple.hpp>
 #include <boost/asio/use_awaitable.hpp>
+#include <stdexcept>
 
 #include "server/config/endpoint.hpp"
 
@@ -36,6 +38,13 @@ void bind(tcp::acceptor& acceptor, const tcp::endpoint& endpoint, boost::system:
   if (error) acceptor.close();
 }
 
+[[noreturn]] void refuse(const tcp::endpoint& endpoint, const boost::system::error_code& error) {
+  const std::string why = error == asio::error::address_in_use
+                              ? "another program listens there; stop it, or choose another port"
+                              : error.message();
+  throw std::runtime_error{fmt::format("cannot listen on {}: {}", config::text(endpoint), why)};
+}
+
 }  // namespace
 
 Listener::Listener(asio::io_context& loop, runtime::Clock& clock, const tcp::endpoint& endpoint, bool or_any_port)
@@ -47,7 +56,7 @@ Listener::Listener(asio::io_context& loop, runtime::Clock& clock, const tcp::end
     spdlog::warn("port {} is taken; using a free one", endpoint.port());
     bind(acceptor_, tcp::endpoint{endpoint.address(), 0}, error);
   }
-  if (error) throw boost::system::system_error{error, "cannot listen on " + config::text(endpoint)};
+  if (error) refuse(endpoint, error);
 }
 
 asio::awaitable<void> Listener::run(std::function<void(tcp::socket)> on_connection) {

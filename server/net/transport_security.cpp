@@ -152,8 +152,8 @@ std::vector<std::string> TransportSecurity::names() const {
   return handshakes_->context().certificate.names;
 }
 
-std::string TransportSecurity::to_trust() const {
-  return http_.tls != nullptr ? fs::absolute(certificate_).string() : "";
+std::string TransportSecurity::to_trust(const PortAccess& port) const {
+  return port.tls != nullptr ? fs::absolute(certificate_).string() : "";
 }
 
 nlohmann::json TransportSecurity::state() const {

@@ -42,8 +42,8 @@ class TransportSecurity {
   std::vector<std::string> names() const;
   // As `security` of GET /api/v1/station: {"http": "tls", "robots": "plain", "exposed": false, "certificate": {…}|null}
   nlohmann::json state() const;
-  // What programs on this machine need to trust the HTTP port; empty: it is plain.
-  std::string to_trust() const;
+  // The certificate that programs on this machine need to trust the port, which is one of this; empty: it is plain.
+  std::string to_trust(const PortAccess& port) const;
 
   const runtime::WorkerThread& worker() const { return worker_; }
   const tls::TlsHandshakes* handshakes() const { return handshakes_ ? &*handshakes_ : nullptr; }

@@ -4,6 +4,8 @@
 #include <CLI/CLI.hpp>
 #include <iostream>
 
+#include "base/number_text.hpp"
+
 namespace sim_robot {
 namespace {
 
@@ -11,11 +13,15 @@ using Samples = std::map<std::uint64_t, ReceivedSample>;
 
 void write_boot(std::ostream& out, const ScenarioRun& run, const Samples& samples, std::size_t boot) {
   for (const auto& [seq, sample] : samples) {
-    out << static_cast<double>(sample.robot_time_us) * 1e-6 << ',' << sample.position_m << ',' << sample.velocity_m_s
-        << ',' << sample.acceleration_m_s2 << ',' << sample.duty << ',' << sample.impedance_mv << ','
-        << sample.reference_m << ',' << sample.position_sd_m << ',' << protocol::text(sample.mode) << ','
-        << protocol::text(sample.sub_state) << ',' << boot << ',' << run.true_position_m(boot, sample.robot_time_us)
-        << '\n';
+    std::string line;
+    base::append_seconds(line, static_cast<std::int64_t>(sample.robot_time_us));
+    for (const float value : {sample.position_m, sample.velocity_m_s, sample.acceleration_m_s2, sample.duty,
+                              sample.impedance_mv, sample.reference_m, sample.position_sd_m}) {
+      line += ',';
+      base::append_float(line, value, "nan");
+    }
+    out << line << ',' << protocol::text(sample.mode) << ',' << protocol::text(sample.sub_state) << ',' << boot << ','
+        << run.true_position_m(boot, sample.robot_time_us) << '\n';
   }
 }
 

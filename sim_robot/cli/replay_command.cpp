@@ -14,8 +14,7 @@ constexpr double kRecordedS = 30;
 
 ReplayCommand::ReplayCommand(CLI::App& app)
     : command_(app.add_subcommand("replay", "load test: many robots that send recorded telemetry as their own")) {
-  command_->add_option("--station", station_, "ADDR:PORT of the station's robot port")->required();
-  add_tls(*command_, tls_);
+  add_station(*command_, station_);
   command_->add_option("--robots", options_.robots, "how many")->check(CLI::Range(1, kMostRobots))->required();
   command_->add_option("--id", options_.id_prefix, "the robots are ID-1 to ID-N")->capture_default_str();
   command_->add_option("--token", token_, "enrolment token, the same for all");
@@ -33,7 +32,7 @@ ReplayCommand::ReplayCommand(CLI::App& app)
 }
 
 int ReplayCommand::run() {
-  options_.station = station_address(station_, tls_);
+  options_.station = station_address(station_);
   if (!std::isfinite(options_.duration_s)) throw std::invalid_argument("--duration-s: not a time");
   const Recording recording =
       frames_.empty() ? make_recording(kRecordedS, samples_per_frame_, seed_) : load_recording(frames_);

@@ -3,7 +3,7 @@
 
 #include <CLI/CLI.hpp>
 
-#include "sim_robot/cli/tls_options.hpp"
+#include "sim_robot/cli/station_options.hpp"
 #include "sim_robot/fleet/fleet_run.hpp"
 
 namespace sim_robot {
@@ -19,8 +19,8 @@ class ReplayCommand {
  private:
   CLI::App* command_;
   FleetOptions options_;
-  TlsOptions tls_;
-  std::string station_, token_, frames_;
+  StationOptions station_;
+  std::string token_, frames_;
   double rate_ = 1;
   std::uint32_t samples_per_frame_ = 10;
   std::uint64_t seed_ = 1;

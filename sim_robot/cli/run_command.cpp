@@ -26,10 +26,8 @@ namespace asio = boost::asio;
 
 constexpr int kNeverIn = 2;  // exit status, as of a fleet
 
-void say(const std::string& line) { std::cout << "rheonaut-sim: " << line << std::endl; }
-
-// What goes with a fleet's JSON.
-void say_aside(const std::string& line) { std::cerr << "rheonaut-sim: " << line << std::endl; }
+// Beside a fleet's summary, which goes to standard output.
+void say(const std::string& line) { std::cerr << "rheonaut-sim: " << line << std::endl; }
 
 void spawn(asio::io_context& loop, asio::awaitable<void> task) {
   asio::co_spawn(loop, std::move(task), [](const std::exception_ptr& error) {
@@ -107,8 +105,7 @@ void stop_at_end(asio::io_context& loop, asio::signal_set& stop, asio::steady_ti
 }  // namespace
 
 RunCommand::RunCommand(CLI::App& app) {
-  app.add_option("--station", station_, "ADDR:PORT of the station's robot port");
-  add_tls(app, tls_);
+  add_station(app, station_);
   app.add_option("--handshake-ms", handshake_ms_, "as TLS on the robot's board: it dials at rest, and ticks are missed")
       ->check(CLI::Range(0, 30'000))
       ->capture_default_str();
@@ -128,14 +125,13 @@ RunCommand::RunCommand(CLI::App& app) {
 }
 
 int RunCommand::run() const {
-  if (station_.empty()) throw CLI::RequiredError("--station");
+  const StationAddress station = station_address(station_);
   const Scenario scenario = scenario_of(robot_);
-  const StationAddress station = station_address(station_, tls_);
   return robots_ > 0 ? run_many(scenario, station) : run_one(scenario, station);
 }
 
 int RunCommand::run_many(const Scenario& scenario, const StationAddress& station) const {
-  announce(scenario, false, json_ ? say_aside : say);
+  announce(scenario, false, say);
   FleetOptions fleet;
   fleet.station = station;
   fleet.robots = robots_;

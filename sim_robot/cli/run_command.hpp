@@ -1,10 +1,11 @@
-// `rheonaut-sim --station …`: one robot or a fleet in real time, with or without a scenario.
+// `rheonaut-sim --data …` and `rheonaut-sim --station …`: one robot or a fleet in real time, with or without a
+// scenario.
 #pragma once
 
 #include <string>
 
 #include "sim_robot/cli/robot_options.hpp"
-#include "sim_robot/cli/tls_options.hpp"
+#include "sim_robot/cli/station_options.hpp"
 #include "sim_robot/client/station_connection.hpp"
 
 namespace sim_robot {
@@ -22,9 +23,9 @@ class RunCommand {
   int run_many(const Scenario& scenario, const StationAddress& station) const;
 
   RobotOptions robot_;
-  TlsOptions tls_;
+  StationOptions station_;
   int handshake_ms_ = 0;
-  std::string station_, faults_at_, truth_to_;
+  std::string faults_at_, truth_to_;
   bool faults_anywhere_ = false;
   int robots_ = 0;  // 0: one, without a fleet's summary
   bool json_ = false;

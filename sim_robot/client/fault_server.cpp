@@ -10,6 +10,7 @@
 #include <charconv>
 #include <stdexcept>
 
+#include "sim_robot/client/listening.hpp"
 #include "sim_robot/client/no_throw.hpp"
 #include "sim_robot/scenario/fault_requests.hpp"
 
@@ -97,7 +98,7 @@ tcp::endpoint parse_faults_address(const std::string& text, bool anywhere) {
 
 FaultServer::FaultServer(asio::io_context& loop, const tcp::endpoint& at, FaultTimeline& faults, FaultyRobot robot,
                          std::chrono::milliseconds time)
-    : acceptor_(loop, at), faults_(faults), robot_(robot), time_(time) {}
+    : acceptor_(listen_on(loop, at)), faults_(faults), robot_(robot), time_(time) {}
 
 asio::awaitable<void> FaultServer::run() {
   for (;;) {

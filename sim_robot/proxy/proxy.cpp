@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "base/fields.hpp"
+#include "sim_robot/client/listening.hpp"
 #include "sim_robot/world/microseconds.hpp"
 
 namespace sim_robot {
@@ -39,15 +40,9 @@ Proxy::Proxy(asio::io_context& loop, ProxyOptions options, LinkLog log)
       made_with_{options_.impairment, options_.impairment},
       impairments_(made_with_),
       log_(std::move(log)),
-      acceptor_(loop),
+      acceptor_(listen_on(loop, options_.listen)),
       outage_timer_(loop) {
   check(options_.impairment);
-  boost::system::error_code error;
-  acceptor_.open(options_.listen.protocol());
-  acceptor_.set_option(tcp::acceptor::reuse_address{true});
-  acceptor_.bind(options_.listen, error);
-  if (!error) acceptor_.listen(asio::socket_base::max_listen_connections, error);
-  if (error) throw boost::system::system_error{error, "cannot listen on " + text(options_.listen)};
   endpoint_ = acceptor_.local_endpoint();
   log_("listening on " + text(endpoint_));
   for (const Outage& outage : options_.outages) plan(outage);

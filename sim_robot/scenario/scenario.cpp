@@ -29,13 +29,14 @@ Scenario load_scenario(const std::filesystem::path& file) {
 }
 
 Scenario find_scenario(const std::string& name_or_file) {
-  std::string names;
+  std::vector<std::string> names;
   for (const base::EmbeddedFile& shipped : scenario_files()) {
     if (shipped.name == name_or_file) return parse_scenario(shipped.content, std::string(shipped.name) + ".toml");
-    names += (names.empty() ? "" : ", ") + std::string(shipped.name);
+    names.emplace_back(shipped.name);
   }
   if (std::filesystem::is_regular_file(name_or_file)) return load_scenario(name_or_file);
-  base::throw_invalid("there is no scenario '", name_or_file, "', neither a file nor one of ", names);
+  base::throw_invalid("there is no scenario '", name_or_file, "', neither a file nor one of ", base::list_of(names),
+                      base::did_you_mean(name_or_file, names));
 }
 
 }  // namespace sim_robot

@@ -70,12 +70,13 @@ class Printer {
       second_ = second;
     }
     text(beginning_);
-    std::int64_t micros = utc_us % kSecondUs;
-    for (std::size_t place = 6; place-- > 0; micros /= 10) {
-      buffer_[at_ + place] = static_cast<char>('0' + micros % 10);
-    }
-    at_ += 6;
+    micros(utc_us % kSecondUs);
     mark('Z');
+  }
+  void seconds(std::int64_t time_us) {
+    number(time_us / kSecondUs);
+    mark('.');
+    micros(time_us % kSecondUs);
   }
   void end_line() {
     mark('\n');
@@ -83,6 +84,12 @@ class Printer {
   }
 
  private:
+  void micros(std::int64_t value) {
+    for (std::size_t place = 6; place-- > 0; value /= 10) {
+      buffer_[at_ + place] = static_cast<char>('0' + value % 10);
+    }
+    at_ += 6;
+  }
   void flush() {
     std::fwrite(buffer_, 1, at_, stdout);
     at_ = 0;
@@ -112,7 +119,7 @@ std::int64_t print_run(sqlite3* handle, std::int64_t run) {
              " WHERE row BETWEEN ? AND ?"};
   segments.bind(1, run);
   Printer out;
-  std::int64_t printed = 0;
+  std::int64_t printed = 0, span = -1, begin_us = 0;
   while (segments.next()) {
     const std::int64_t first_seq = segments.integer(2), last_seq = segments.integer(3);
     if (first_seq > last_seq) continue;
@@ -122,6 +129,8 @@ std::int64_t print_run(sqlite3* handle, std::int64_t run) {
     const std::int64_t skipped = first_seq - segments.integer(4);
     const std::int64_t first_row = segments.integer(5) + skipped;
     std::int64_t robot_time_us = segments.integer(6) + skipped * segments.integer(7);
+    if (span != segments.integer(0)) begin_us = robot_time_us;
+    span = segments.integer(0);
     rows.bind(1, first_row);
     rows.bind(2, first_row + last_seq - first_seq);
     for (std::int64_t seq = first_seq; rows.next(); ++seq, robot_time_us += segments.integer(7)) {
@@ -129,6 +138,8 @@ std::int64_t print_run(sqlite3* handle, std::int64_t run) {
       out.number(seq);
       out.mark(',');
       out.number(robot_time_us);
+      out.mark(',');
+      out.seconds(robot_time_us - begin_us);
       out.mark(',');
       out.utc(robot_time_us + segments.integer(8));
       for (int channel = 0; channel < kChannels; ++channel) {

@@ -167,9 +167,10 @@ TEST_F(ProxyTest, ATakenPortIsNamed) {
   try {
     start(options);
     FAIL() << "listens on a port that is taken";
-  } catch (const boost::system::system_error& error) {
+  } catch (const std::runtime_error& error) {
     const std::string address = "127.0.0.1:" + std::to_string(target.local_endpoint().port());
-    EXPECT_NE(std::string(error.what()).find("cannot listen on " + address), std::string::npos) << error.what();
+    EXPECT_EQ(std::string(error.what()),
+              "cannot listen on " + address + ": another program listens there; stop it, or choose another port");
   }
 }
 

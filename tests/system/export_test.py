@@ -190,9 +190,10 @@ class ExportTest(unittest.TestCase):
         self.assertGreater(len(channels["/command"]["messages"]), 0)
 
     def compare_row(self, row, message, values, properties, is_sample):
-        if is_sample:  # a binary32 as its shortest decimal
-            values = {name: as_binary32(value) if properties[name]["type"] == "number" else value
-                      for name, value in values.items()}
+        # A binary32 is its shortest decimal; t_s counts exact microseconds.
+        values = {name: as_binary32(value) if properties[name]["type"] == "number" and name != "t_s" else value
+                  for name, value in values.items()}
+        if is_sample:
             self.assertEqual(int(message["log_time"]), 1000 * row["utc_us"])
             self.assertEqual(int(message["publish_time"]), 1000 * row["robot_time_us"])
             self.assertEqual(message["sequence"], row["seq"])

@@ -176,7 +176,7 @@ class RobotTest(unittest.TestCase):
         self.assertEqual(robot.stop(), 2, "no station took it in")
 
     def test_a_robot_says_what_is_wrong_with_its_arguments(self):
-        for arguments, words in (((), "--station is required"),
+        for arguments, words in (((), "--station or --data is required"),
                                  (("--station", "nowhere"), "--station: 'nowhere' is not ADDR:PORT"),
                                  (("--station", "127.0.0.1:0"), "--station: '0' is not a port"),
                                  (("--station", "127.0.0.1:7700", "--id", "Robot 1"), "robot id 'Robot 1'")):

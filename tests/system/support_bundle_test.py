@@ -101,6 +101,11 @@ class SupportBundleTest(unittest.TestCase):
             self.assertIn("/login?code=", station_log)
             secrets["code of the first link"] = re.search(r"code=(\S+)", station_log).group(1)
             log.write_text(station_log + "\n".join(text for text, _ in PLANTED.values()) + f"\ntoken {station.token}\n")
+            said = place.tool("support-bundle", "--data", place.data, "--to", place.folder / "said.zip", "--json")
+            answer = json.loads(said.stdout)
+            self.assertIsInstance(answer.pop("problems"), int)
+            self.assertEqual(answer, {"file": str(place.folder / "said.zip"),
+                                      "size_bytes": (place.folder / "said.zip").stat().st_size})
             files = self.bundle(place, "--log", log, "--config", place.folder / "rheonaut.toml")
             self.assertEqual(set(files), {"README.txt", "doctor.txt", "doctor.json", "versions.json", "config.json",
                                           "metrics.txt", "schema.sql", "tables.json", "parameters.json",

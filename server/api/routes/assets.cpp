@@ -67,4 +67,12 @@ http::Response page_response(const http::Request& request) {
   return http::problem(404, "there is nothing at this path", "unknown_path");
 }
 
+std::string_view page_of_an_old_link() {
+  const auto files = cockpit_files();
+  const auto cockpit = std::ranges::find(files, "/index.html", &base::EmbeddedFile::name);
+  if (cockpit != files.end()) return cockpit->content;
+  return "<!doctype html><title>Rheonaut</title><p>This link was used already, or is older than 10 minutes. On the "
+         "station's machine, `rheonaut login-link --data FOLDER` makes a new one.";
+}
+
 }  // namespace server::api

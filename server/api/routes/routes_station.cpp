@@ -50,10 +50,7 @@ http::Answer log_in(StationRoutes parts, http::Request request) {
   }
   const auto session = parts.auth.log_in(request.query["code"], request.peer, request.header("user-agent"));
   if (!session) {
-    co_return http::html_response(
-        401,
-        "<!doctype html><title>Rheonaut</title><p>This link was used already or is too old. Open "
-        "the link that the station prints when it starts, or make a new one: docs/api.md says how.");
+    co_return http::html_response(401, std::string{page_of_an_old_link()});
   }
   http::Response response = http::html_response(303, "");
   response.headers.emplace_back("Location", "/");

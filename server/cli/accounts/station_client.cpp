@@ -14,6 +14,10 @@ namespace asio = boost::asio;
 namespace {
 
 nlohmann::json announcement_in(const std::filesystem::path& file) {
+  if (!std::filesystem::exists(file)) {
+    throw std::runtime_error{
+        fmt::format("no station runs in '{0}': rheonaut serve --data '{0}' starts one", file.parent_path().string())};
+  }
   std::ifstream in{file};
   auto content = nlohmann::json::parse(in, nullptr, false);
   if (!content.is_object() || !content.contains("http")) {
@@ -31,6 +35,10 @@ asio::ip::tcp::endpoint endpoint_of(const nlohmann::json& announcement) {
 }
 
 std::string token_of(const std::filesystem::path& file) {
+  if (!std::filesystem::exists(file.parent_path())) {
+    throw std::runtime_error{
+        fmt::format("there is no folder '{}'; --data names that of a station", file.parent_path().string())};
+  }
   std::ifstream in{file};
   std::string token;
   if (!std::getline(in, token) || token.empty()) {

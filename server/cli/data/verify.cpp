@@ -93,7 +93,7 @@ Result<Verified> verify_export(const std::filesystem::path& path, const Verify& 
   }
   try {
     SQLite::Database file = storage::open_for_reading(path);
-    if (file.execAndGet("PRAGMA user_version").getInt64() < storage::kRunFileVersion) {
+    if (file.execAndGet("PRAGMA user_version").getInt64() < storage::kRunFileAuditSince) {
       return fail(ErrorCode::invalid,
                   fmt::format("{} was exported by an earlier version: no audit is in it", path.string()));
     }

@@ -6,8 +6,10 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <filesystem>
 #include <limits>
 #include <optional>
+#include <stdexcept>
 
 #include "server/analysis/control_json.hpp"
 #include "server/analysis/optional_json.hpp"
@@ -171,6 +173,17 @@ void write_table(std::ostream& out, const Profile& profile, const std::vector<Pr
              profile.conditions.mean_flow_m_s);
 }
 
+// Throws UsageError with the names where there is no such profile.
+Profile profile_of(const std::string& name_or_file) {
+  const bool is_file = std::filesystem::exists(name_or_file);
+  try {
+    return experiments::find_profile(name_or_file);
+  } catch (const std::invalid_argument& error) {
+    if (is_file) throw;
+    throw UsageError{error.what()};
+  }
+}
+
 int list(const ProfileQuestion& options, std::ostream& out) {
   OrderedJson all = OrderedJson::array();
   Table table{{"profile", "<name", "runs", "duration of a run (s)"}};
@@ -226,7 +239,7 @@ int run(const ProfileQuestion& options, std::ostream& out) {
   }
   if (!options.profile) return list(options, out);
   if (options.prints_text) return print_text(*options.profile, out);
-  const Profile profile = experiments::find_profile(*options.profile);
+  const Profile profile = profile_of(*options.profile);
   const std::vector<Predicted> runs = predict(profile, options);
   if (options.run > runs.size()) {
     throw UsageError{fmt::format("--run {}: the profile has {} runs", options.run, runs.size())};

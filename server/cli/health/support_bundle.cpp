@@ -235,6 +235,7 @@ void add_options(CLI::App& command, SupportBundle& options) {
       ->required();
   command.add_option("--log", options.log, "File with the station's log (default: the journal of the unit rheonaut)")
       ->check(named());
+  add_json_flag(command, options.form);
   command.footer("Example: rheonaut support-bundle --data ~/lab --to bundle.zip");
 }
 
@@ -271,6 +272,12 @@ int run(const SupportBundle& options, std::ostream& out) {
   while (archive.seal()) {
   }
   storage::finish_file(part.path(), options.to);
+  if (options.form.is_json) {
+    write_json(
+        out,
+        {{"file", options.to.string()}, {"size_bytes", fs::file_size(options.to)}, {"problems", findings.problems()}});
+    return 0;
+  }
   fmt::print(out, "{}: look through it before you pass it on; doctor.txt says: {}\n", options.to.string(),
              findings.problems() == 0 ? "nothing is wrong" : fmt::format("{} problems", findings.problems()));
   return 0;

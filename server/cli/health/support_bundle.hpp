@@ -17,6 +17,7 @@
 #include <optional>
 #include <ostream>
 
+#include "server/cli/terminal/output.hpp"
 #include "server/config/config.hpp"
 
 namespace CLI {
@@ -29,6 +30,7 @@ struct SupportBundle {
   config::ConfigFlags flags;  // file and data_dir only
   std::filesystem::path to;
   std::optional<std::filesystem::path> log;
+  OutputForm form;
 };
 
 void add_options(CLI::App& command, SupportBundle& options);

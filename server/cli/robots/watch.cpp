@@ -260,6 +260,11 @@ void add_options(CLI::App& command, WatchCommand& options) {
 }
 
 int run(const WatchCommand& options, std::ostream& out) {
+  if (!std::filesystem::exists(
+          options.data_dir)) {  // a station that is not there yet is waited for; a wrong name is not
+    throw std::runtime_error{
+        fmt::format("there is no folder '{}'; --data names that of a station", options.data_dir.string())};
+  }
   if (!options.is_once) return watch_on(options);
   Watch watch{options};
   if (!watch.look()) throw std::runtime_error{watch.problem()};

@@ -32,8 +32,8 @@ void visit_members(const station::RobotEvent& event, Visit visit) {
   visit("cause", event.cause);
   visit("mode", std::string{protocol::text(event.mode)});
   visit("sub_state", std::string{protocol::text(event.sub_state)});
-  visit("position_m", static_cast<double>(event.position_m));
-  visit("value", static_cast<double>(event.value));
+  visit("position_m", event.position_m);
+  visit("value", event.value);
   visit("emergency_id", std::to_string(event.emergency_id));
   visit("command_id", std::to_string(event.command_id));
   visit("received_at_us", event.received_at_us);
@@ -65,7 +65,7 @@ void visit_members(const station::CommandRecord& command, Visit visit) {
 }
 
 const char* json_type_of(const std::string&) { return "string"; }
-const char* json_type_of(double) { return "number"; }
+const char* json_type_of(float) { return "number"; }
 const char* json_type_of(std::integral auto) { return "integer"; }
 template <class Value>
 const char* json_type_of(const std::optional<Value>&) {
@@ -80,10 +80,10 @@ std::string schema() {
   return base::dump({{"type", "object"}, {"properties", properties}});
 }
 
-// A value that is none, or no finite number, is left out.
+// A value that is none, or no finite number, is left out; a number is the shortest decimal of its binary32.
 struct MessageWriter {
-  void operator()(const char* name, double value) {
-    if (std::isfinite(value)) message[name] = value;
+  void operator()(const char* name, float value) {
+    if (std::isfinite(value)) message[name] = base::decimal(value);
   }
   template <class Value>
   void operator()(const char* name, const std::optional<Value>& value) {

@@ -24,6 +24,7 @@ constexpr const char* kIntegers[] = {
 constexpr std::pair<const char*, const char*> kDescriptions[] = {
     {"position_m", "believed position plus disturbance_m: the robot's estimate, ± position_sd_m"},
     {"position_sd_m", "± of position_m, one standard deviation; none: not known"},
+    {"t_s", "seconds since the first sample of the span, on the robot's clock"},
     {"utc_us", "station's estimate of UTC, ± clock_uncertainty_us"},
     {"clock_uncertainty_us", "± of utc_us, at most; -1: no estimate yet"}};
 
@@ -48,6 +49,7 @@ std::string telemetry_schema(const ChosenFields& chosen) {
   const auto add = [&](const char* name, const char* type) { properties[name] = {{"type", type}}; };
   add("boot_id", "string");
   for (const char* name : kIntegers) add(name, "integer");
+  add("t_s", "number");
   for (std::size_t row = 0; row < kSampleFieldCount; ++row) {
     if (chosen[row]) add(kSampleFields[row].name, "number");
   }
@@ -83,22 +85,26 @@ TelemetryMessages::TelemetryMessages(std::optional<std::uint32_t> span, std::uin
 }
 
 void TelemetryMessages::append(std::string& out, const SamplePlace& place, const Sample& sample,
-                               std::optional<SampleGaps> gaps) const {
+                               std::optional<SampleInRun> in_run) const {
   out += beginning_;
   append_number(out, place.seq);
   out += ",\"robot_time_us\":";
   append_number(out, place.robot_time_us);
+  if (in_run) {
+    out += ",\"t_s\":";
+    base::append_seconds(out, in_run->since_us);
+  }
   out += ",\"utc_us\":";
   append_number(out, place.utc_us);
   for (std::size_t row = 0; row < kSampleFieldCount; ++row) {
     if (chosen_[row]) append_member(out, kSampleFields[row].name, sample.*kSampleFields[row].member);
   }
   out += shared_;
-  if (gaps) {
+  if (in_run) {
     out += ",\"gap_before\":";
-    append_number(out, gaps->before);
+    append_number(out, in_run->gap_before);
     out += ",\"gap_after\":";
-    append_number(out, gaps->after);
+    append_number(out, in_run->gap_after);
   }
   out += end_;
 }

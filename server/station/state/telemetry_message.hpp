@@ -1,11 +1,11 @@
 // A sample as a message in JSON with its JSON Schema: the same in MCAP files and live for Foxglove.
 //
-//   span, boot_id, seq, robot_time_us, utc_us, the rows of kSampleFields, those of kBatchFields, clock_uncertainty_us,
-//   first_received_at_us, received_at_us, gap_before, gap_after, unknown_values
+//   span, boot_id, seq, robot_time_us, t_s, utc_us, the rows of kSampleFields, those of kBatchFields,
+//   clock_uncertainty_us, first_received_at_us, received_at_us, gap_before, gap_after, unknown_values
 //
 // A value that is none, or not finite, is left out; a number of a sample is the shortest decimal that gives the same
-// binary32 back. What a sample has only as part of a run (span, gap_before, gap_after) is missing in live messages. The
-// schema says of the position that it is believed, and which member is its ±. No errors.
+// binary32 back. What a sample has only as part of a run (span, t_s, gap_before, gap_after) is missing in live
+// messages. The schema says of the position that it is believed, and which member is its ±. No errors.
 #pragma once
 
 #include <bitset>
@@ -33,8 +33,9 @@ struct SamplePlace {
   std::int64_t utc_us = 0;
 };
 
-struct SampleGaps {
-  std::uint64_t before = 0, after = 0;  // samples that are missing there
+struct SampleInRun {
+  std::int64_t since_us = 0;                    // since the first sample of its span, written as t_s
+  std::uint64_t gap_before = 0, gap_after = 0;  // samples that are missing there
 };
 
 // The messages of samples that share everything but their values; what they share is written once.
@@ -43,7 +44,8 @@ class TelemetryMessages {
   TelemetryMessages(std::optional<std::uint32_t> span, std::uint64_t boot_id, const SampleContext& context,
                     const ReceptionTimes& times, const ChosenFields& chosen);
 
-  void append(std::string& out, const SamplePlace& place, const Sample& sample, std::optional<SampleGaps> gaps) const;
+  void append(std::string& out, const SamplePlace& place, const Sample& sample,
+              std::optional<SampleInRun> in_run) const;
 
  private:
   ChosenFields chosen_;

@@ -13,6 +13,7 @@ namespace server::storage {
 
 using base::append_float;
 using base::append_number;
+using base::append_seconds;
 namespace {
 
 constexpr std::size_t kCsvPageSamples = 2'000;
@@ -20,13 +21,6 @@ constexpr std::size_t kPieceBytes = 384 * 1024;  // of a grid, whose gaps may be
 constexpr std::int64_t kSecondUs = 1'000'000;
 constexpr std::size_t kBeforeTimes = 4;  // so many fields of a batch stand before the times of receipt
 constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
-
-// Six digits: 000001.
-void append_micros(std::string& out, std::int64_t micros) {
-  char digits[6];
-  for (std::size_t place = 6; place-- > 0; micros /= 10) digits[place] = static_cast<char>('0' + micros % 10);
-  out.append(digits, 6);
-}
 
 // Empty for none.
 std::string quoted(const std::optional<std::string>& text) {
@@ -51,7 +45,7 @@ void UtcText::append(std::string& out, std::int64_t utc_us) {
     second_ = second;
   }
   out += beginning_;
-  append_micros(out, utc_us - second * kSecondUs);
+  base::append_micros(out, utc_us - second * kSecondUs);
   out += 'Z';
 }
 
@@ -90,11 +84,11 @@ void CsvWriter::append_rows(std::string& out) {
 }
 
 std::string CsvWriter::header() const {
-  std::string out = grid_ ? "span,t_s,utc" : "span,boot_id,seq,robot_time_us,utc";
+  std::string out = grid_ ? "span,t_s,utc" : "span,boot_id,seq,robot_time_us,t_s,utc";
   for (std::size_t channel = 0; channel < kChannels; ++channel) {
     if (query_.channels[channel]) out += fmt::format(",{}", text(static_cast<Channel>(channel)));
   }
-  if (grid_) return out + ",setpoint_m,gap\n";
+  if (grid_) return out + ",setpoint_m,mode,gap\n";
   std::size_t number = 0;
   station::for_each_batch_field([&](const auto& field) {
     if (number++ == kBeforeTimes) out += ",clock_uncertainty_us,first_received_at_us,received_at_us";
@@ -135,6 +129,8 @@ void CsvWriter::append(std::string& out, const ExportSegment& exported) {
     out += ',';
     append_number(out, robot_time_us);
     out += ',';
+    append_seconds(out, exported.since_us(robot_time_us));
+    out += ',';
     utc_.append(out, static_cast<std::int64_t>(robot_time_us) + segment.utc_offset_us);
     for (std::size_t channel = 0; channel < kChannels; ++channel) {
       if (!query_.channels[channel]) continue;
@@ -152,9 +148,7 @@ void CsvWriter::append(std::string& out, const ExportSegment& exported) {
 void CsvWriter::append(std::string& out, const GridRow& row) {
   append_number(out, row.span);
   out += ',';
-  append_number(out, row.since_us / kSecondUs);
-  out += '.';
-  append_micros(out, row.since_us % kSecondUs);
+  append_seconds(out, row.since_us);
   out += ',';
   utc_.append(out, row.utc_us);
   for (std::size_t channel = 0; channel < kChannels; ++channel) {
@@ -163,8 +157,12 @@ void CsvWriter::append(std::string& out, const GridRow& row) {
     append_float(out, row.sample != nullptr ? row.sample->*kSampleMembers[channel] : kNone, "");
   }
   out += ',';
-  append_float(out, row.sample != nullptr ? station::or_nan(row.setpoint_m) : kNone, "");
-  out += row.sample != nullptr ? ",0\n" : ",1\n";
+  if (row.sample == nullptr) {
+    out += ",,1\n";
+    return;
+  }
+  append_float(out, station::or_nan(row.context->setpoint_m), "");
+  out += fmt::format(",{},0\n", protocol::text(row.context->mode));
 }
 
 }  // namespace server::storage

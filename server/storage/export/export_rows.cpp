@@ -52,9 +52,12 @@ std::uint64_t PagedSegments::gap_after() const {
 std::optional<ExportSegment> SegmentRows::next() {
   const SpanSegment* const part = segments_.first();
   if (part == nullptr) return std::nullopt;
-  if (span_ != part->span) next_seq_ = part->span_first_seq;
+  if (span_ != part->span) {
+    next_seq_ = part->span_first_seq;
+    begin_us_ = part->segment.first_robot_time_us;
+  }
   span_ = part->span;
-  const ExportSegment found{part, part->segment.first_seq - next_seq_, segments_.gap_after()};
+  const ExportSegment found{part, part->segment.first_seq - next_seq_, segments_.gap_after(), begin_us_};
   next_seq_ = part->segment.next_seq();
   segments_.pass();
   return found;
@@ -90,8 +93,7 @@ void GridRows::enter(const SpanSegment& part) {
 
 void GridRows::leave(const Segment& segment) {
   const std::size_t index = segment.samples.size() - 1;
-  last_ = Last{segment.samples[index], segment.context.setpoint_m, segment.robot_time_us(index),
-               segment.context.period_us, segment.utc_offset_us};
+  last_ = Last{segment.samples[index], segment.context, segment.robot_time_us(index), segment.utc_offset_us};
 }
 
 // Before the segment, and after the last sample before it, which there is: a span begins with a sample.
@@ -101,14 +103,14 @@ GridRow GridRows::between(const Segment& next, std::uint64_t time_us) {
   const std::uint64_t until_us = next.first_robot_time_us - time_us;
   GridRow row;
   row.utc_us = static_cast<std::int64_t>(time_us) + last.utc_offset_us;
-  const bool last_is_near = 2 * since_us <= last.period_us;
+  const bool last_is_near = 2 * since_us <= last.context.period_us;
   if (2 * until_us <= next.context.period_us && !(last_is_near && since_us <= until_us)) {
     row.sample = &next.samples.front();
-    row.setpoint_m = next.context.setpoint_m;
+    row.context = &next.context;
     row.utc_us = static_cast<std::int64_t>(time_us) + next.utc_offset_us;
   } else if (last_is_near) {
     row.sample = &last.sample;
-    row.setpoint_m = last.setpoint_m;
+    row.context = &last.context;
   }
   return row;
 }
@@ -121,7 +123,7 @@ GridRow GridRows::within(const Segment& segment, std::uint64_t time_us) {
   GridRow row;
   row.utc_us = static_cast<std::int64_t>(time_us) + segment.utc_offset_us;
   row.sample = &segment.samples[index];
-  row.setpoint_m = segment.context.setpoint_m;
+  row.context = &segment.context;
   return row;
 }
 
@@ -132,7 +134,7 @@ GridRow GridRows::after(const Segment& segment, std::uint64_t time_us) {
   const std::size_t last = segment.samples.size() - 1;
   if (2 * (time_us - segment.robot_time_us(last)) > segment.context.period_us) return row;
   row.sample = &segment.samples[last];
-  row.setpoint_m = segment.context.setpoint_m;
+  row.context = &segment.context;
   return row;
 }
 

@@ -27,15 +27,23 @@ struct ExportSegment {
   const SpanSegment* part = nullptr;
   std::uint64_t gap_before = 0;  // samples that are missing right before the first of them
   std::uint64_t gap_after = 0;   // and after the last of them, to the end of the span
+  std::uint64_t begin_us = 0;    // robot time of the first sample of the span, from which t_s counts
+
+  std::int64_t since_us(std::uint64_t robot_time_us) const {
+    return static_cast<std::int64_t>(robot_time_us - begin_us);
+  }
 };
 
 struct GridRow {
   std::uint32_t span = 0;
-  std::int64_t since_us = 0;                // since the first sample of the span
-  std::int64_t utc_us = 0;                  // in a gap by the clock of the sample before it
-  const station::Sample* sample = nullptr;  // null: a gap
-  std::optional<float> setpoint_m;
+  std::int64_t since_us = 0;                        // since the first sample of the span
+  std::int64_t utc_us = 0;                          // in a gap by the clock of the sample before it
+  const station::Sample* sample = nullptr;          // null: a gap
+  const station::SampleContext* context = nullptr;  // of the sample
 };
+
+// t_s, as binary64: exported like this by every format that has numbers.
+inline double seconds(std::int64_t time_us) { return static_cast<double>(time_us) / 1e6; }
 
 // At least as many samples as the spans hold, from the index alone.
 std::uint64_t most_samples(SQLite::Database& database, const std::vector<RecordedSpan>& spans);
@@ -63,6 +71,7 @@ class SegmentRows {
   PagedSegments segments_;
   std::optional<std::uint32_t> span_;
   std::uint64_t next_seq_ = 0;
+  std::uint64_t begin_us_ = 0;  // of the span, robot time
 };
 
 class GridRows {
@@ -76,9 +85,8 @@ class GridRows {
   // One sample, and what places it.
   struct Last {
     station::Sample sample;
-    std::optional<float> setpoint_m;
+    station::SampleContext context;
     std::uint64_t robot_time_us = 0;
-    std::uint32_t period_us = 0;
     std::int64_t utc_offset_us = 0;
   };
 

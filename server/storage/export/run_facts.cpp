@@ -3,7 +3,6 @@
 
 #include <fmt/format.h>
 
-#include "server/station/state/unknown_values.hpp"
 #include "server/storage/database/statement.hpp"
 
 namespace server::storage {
@@ -21,9 +20,10 @@ void add_facts(SQLite::Database& database, const char* table, const char* prefix
 template <class Enumerator>
 std::string names() {
   std::string out;
-  for (int number = 0; number == 0 || !station::is_unknown(static_cast<Enumerator>(number)); ++number) {
-    const char* comma = number == 0 ? "" : ", ";
-    out += fmt::format("{}{} {}", comma, number, protocol::text(static_cast<Enumerator>(number)));
+  int number = 0;
+  for (const std::string& text : enumerator_texts<Enumerator>()) {
+    out += fmt::format("{}{} {}", number == 0 ? "" : ", ", number, text);
+    ++number;
   }
   return out;
 }

@@ -6,6 +6,8 @@
 #include "server/station/state/unknown_values.hpp"
 #include "server/storage/database/schema.hpp"
 #include "server/storage/database/statement.hpp"
+#include "server/storage/export/run_file_about.hpp"
+#include "server/storage/export/run_file_views.hpp"
 
 namespace server::storage {
 namespace {
@@ -18,12 +20,13 @@ CREATE TABLE sample (
   boot_id TEXT NOT NULL,
   seq INTEGER NOT NULL,
   robot_time_us INTEGER NOT NULL,
+  t_s REAL NOT NULL,                       -- since the first sample of the span, on the robot's clock
   utc_us INTEGER NOT NULL,
   clock_uncertainty_us INTEGER NOT NULL,   -- half-width; -1: there was no estimate
   first_received_at_us INTEGER NOT NULL,
   received_at_us INTEGER NOT NULL,
 )sql";
-constexpr int kPlaceColumnCount = 8, kSeqColumn = 3, kClockColumn = 6;  // counted from 1
+constexpr int kPlaceColumnCount = 9, kSeqColumn = 3, kClockColumn = 7;  // counted from 1
 constexpr const char* kOtherColumns =
     R"sql(  gap_before INTEGER NOT NULL,             -- samples that are missing right before this one
   gap_after INTEGER NOT NULL,              -- and after it, to the end of its span
@@ -70,6 +73,8 @@ bool RunFile::advance(SQLite::Database& database) {
   } else if (tables_) {
     if (tables_->advance(database, spans_)) return true;
     tables_.reset();
+    file_->exec(run_file_views());
+    explain_run_file(*file_);
     file_->exec("BEGIN");
     insert_ = std::make_unique<SQLite::Statement>(*file_, insert_sample());
   } else {
@@ -112,6 +117,7 @@ void RunFile::add(const ExportSegment& exported) {
     int column = kSeqColumn;
     bind_value(*insert_, column, signed_seq(segment.first_seq + index));
     bind_value(*insert_, ++column, robot_time_us);
+    bind_value(*insert_, ++column, seconds(exported.since_us(robot_time_us)));
     bind_value(*insert_, ++column, static_cast<std::int64_t>(robot_time_us) + segment.utc_offset_us);
     column = kPlaceColumnCount;
     for (const float value : values_of(segment.samples[index])) bind_value(*insert_, ++column, value);

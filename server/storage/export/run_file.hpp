@@ -1,10 +1,11 @@
 // A run as a SQLite file of its own, with plain rows: for programs that read SQL, without segments and keys.
 //
-// Tables: run, span, sample, gap, event, command, audit, marker, run_certificate, in_force, outside_reference,
-// outside_position; columns as in the station's views (docs/database.md), ids above 2^63 as text. `sample` has a row
-// per sample in order of span and seq, with gap_before and gap_after. `audit` has the entries from the run's beginning
-// to its end without a hole, so that the chain can be verified; of other robots and of accounts only the hashes. Its
-// application_id is the station's plus 1, so no station takes it for its database.
+// Tables: run, span, sample, gap, boot, clock, event, command, audit, marker, run_certificate, in_force,
+// outside_reference, outside_position; columns as in the station's views (docs/database.md), ids above 2^63 as text.
+// `sample` has a row per sample in order of span and seq, with t_s, gap_before and gap_after. The station's views are
+// there under their names, over these tables, and `about` explains every table, view and column. `audit` has the
+// entries from the run's beginning to its end without a hole, so that the chain can be verified; of other robots and of
+// accounts only the hashes. Its application_id is the station's plus 1, so no station takes it for its database.
 //
 // On the thread that owns the database handle. Throws when the disk does not take it; what it wrote is no whole file
 // before advance() has returned false.
@@ -25,7 +26,8 @@
 namespace server::storage {
 
 inline constexpr std::int64_t kRunFileApplicationId = kApplicationId + 1;
-inline constexpr std::int64_t kRunFileVersion = 2;  // its user_version
+inline constexpr std::int64_t kRunFileVersion = 3;     // its user_version
+inline constexpr std::int64_t kRunFileAuditSince = 2;  // the version that brought the audit
 
 class RunFile {
  public:

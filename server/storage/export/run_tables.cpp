@@ -28,6 +28,7 @@ CREATE TABLE audit (                       -- docs/database.md
   hash BLOB NOT NULL
 );
 CREATE TABLE gap (
+  span INTEGER NOT NULL,
   boot_id TEXT NOT NULL,
   first_seq INTEGER NOT NULL,
   last_seq INTEGER NOT NULL,
@@ -52,6 +53,20 @@ constexpr Copy kCopies[] = {
     {"CREATE TABLE run AS SELECT * FROM store.run WHERE run_id = {0}"},
     {"CREATE TABLE span AS SELECT span, printf('%llu', boot_id) AS boot_id, first_seq, last_seq, firmware_version"
      " FROM store.run_span JOIN store.boot USING (boot_key) WHERE run_id = {0} ORDER BY span"},
+    {"CREATE TABLE boot AS SELECT * FROM store.robot_boot WHERE boot_key IN"
+     " (SELECT boot_key FROM store.run_span WHERE run_id = {0})"},
+    // From the last estimate before a span's first sample to its last sample.
+    {"CREATE TABLE clock AS SELECT DISTINCT robot_id, printf('%llu', boot_id) AS boot_id, robot_time_us,"
+     " robot_time_us + utc_offset_us AS utc_us, utc_offset_us, uncertainty_us, drift_ppm, round_trip_us, "
+     "station_step_us"
+     " FROM store.run_span CROSS JOIN store.boot USING (boot_key) CROSS JOIN store.clock_estimate USING (boot_key)"
+     " WHERE run_id = {0} AND robot_time_us >= coalesce((SELECT max(robot_time_us) FROM store.clock_estimate AS before"
+     " WHERE before.boot_key = run_span.boot_key AND before.robot_time_us <= (SELECT first_robot_time_us"
+     " FROM store.segment WHERE segment.boot_key = run_span.boot_key AND segment.first_seq >= run_span.first_seq - 99"
+     " ORDER BY segment.first_seq LIMIT 1)), 0) AND robot_time_us <= (SELECT first_robot_time_us"
+     " + (segment.last_seq - segment.first_seq) * period_us FROM store.segment"
+     " WHERE segment.boot_key = run_span.boot_key AND segment.first_seq <= coalesce(run_span.last_seq,"
+     " 9223372036854775807) ORDER BY segment.first_seq DESC LIMIT 1)"},
     {"CREATE TABLE event AS SELECT * FROM store.robot_event LIMIT 0"},
     {"INSERT INTO event SELECT robot_event.* FROM run JOIN store.robot_event USING (robot_id)"
      " WHERE event_row > {1} AND event_row <= {2}"
@@ -155,10 +170,10 @@ void RunTables::copy_reference_again() {
 
 bool RunTables::add_gaps(SQLite::Database& database, const std::vector<RecordedSpan>& spans) {
   file_.exec("BEGIN");
-  SQLite::Statement insert{file_, "INSERT INTO gap VALUES (?,?,?,?,?)"};
+  SQLite::Statement insert{file_, "INSERT INTO gap VALUES (?,?,?,?,?,?)"};
   const GapPage page = read_gaps(database, spans, gaps_after_, kSliceGaps);
   for (const Gap& gap : page.gaps) {
-    execute(insert, std::to_string(gap.boot_id), gap.first_seq, gap.last_seq, gap.cause, gap.noticed_at_us);
+    execute(insert, gap.span, std::to_string(gap.boot_id), gap.first_seq, gap.last_seq, gap.cause, gap.noticed_at_us);
   }
   file_.exec("COMMIT");
   gaps_after_ = page.next;

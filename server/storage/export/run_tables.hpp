@@ -1,5 +1,5 @@
-// What a station's database has of a run beside its samples, as tables of another database: run, span, event, command,
-// audit, marker, run_certificate, in_force, outside_reference, outside_position, and gap.
+// What a station's database has of a run beside its samples, as tables of another database: run, span, boot, clock,
+// event, command, audit, marker, run_certificate, in_force, outside_reference, outside_position, and gap.
 //
 // The columns are those of the station's views (docs/database.md), so that what other parts add to a run comes with it.
 //

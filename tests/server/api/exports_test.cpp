@@ -45,7 +45,7 @@ TEST_F(ExportsTest, EachFormatIsAnAttachmentWithItsName) {
 TEST_F(ExportsTest, ChannelsAndAGridAreChosenByTheQuery) {
   make_run();
   const std::string csv = ask("GET", "/api/v1/runs/1/samples.csv?channels=duty&grid_us=100000").body;
-  EXPECT_TRUE(csv.starts_with("span,t_s,utc,duty,setpoint_m,gap\n0,0.000000,"));
+  EXPECT_TRUE(csv.starts_with("span,t_s,utc,duty,setpoint_m,mode,gap\n0,0.000000,"));
   EXPECT_LT(std::ranges::count(csv, '\n'), 20);  // of 500 samples at 100 Hz, some at the same time
   EXPECT_LT(ask("GET", "/api/v1/runs/1/samples.mat?channels=duty").body.size(),
             ask("GET", "/api/v1/runs/1/samples.mat").body.size());

@@ -221,7 +221,7 @@ TEST_F(RoutesTest, ARunHoldsWhatWasMadeBetweenItsBeginAndItsEnd) {
 
   const std::string csv = ask("GET", path + "/samples.csv").body;
   EXPECT_EQ(std::ranges::count(csv, '\n'), 11);
-  EXPECT_TRUE(csv.starts_with("span,boot_id,seq,robot_time_us,utc,position_m,velocity_m_s,"));
+  EXPECT_TRUE(csv.starts_with("span,boot_id,seq,robot_time_us,t_s,utc,position_m,velocity_m_s,"));
   EXPECT_NE(csv.find("\n0,77,5,"), std::string::npos) << csv;
   EXPECT_NE(csv.find("Z,14,0,0,0,0,0,manual,none,,0,"), std::string::npos) << csv;
   EXPECT_EQ(ask("GET", path + "/gaps").parsed(),

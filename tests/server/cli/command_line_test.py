@@ -12,7 +12,7 @@ import unittest
 ROOT = pathlib.Path(__file__).parents[3]
 BIN = pathlib.Path(os.environ["RHEONAUT_BIN"])
 # What prints no result for people: a program that runs on, scripts and pages, documents that are JSON or CSV already.
-WITHOUT_JSON = {"serve", "demo", "support-bundle", "completion", "man", "design show", "design export", "reference export"}
+WITHOUT_JSON = {"serve", "demo", "completion", "man", "design show", "design export", "reference export"}
 ROFF_REQUESTS = {"TH", "SH", "SS", "TP", "PP", "EX", "EE"}
 
 
@@ -116,13 +116,49 @@ class CommandLineTest(unittest.TestCase):
                 self.assertEqual((done.returncode, done.stdout), (2, ""), done)
                 self.assertRegex(done.stderr, r"^rheonaut: [^\n]*--nonsense[^\n]*see rheonaut[^\n]* --help\n$")
         for words, suggestion in ((["srve"], "serve"), (["robot", "paramters"], "parameters"),
-                                  (["identify", "--cvs", "x"], "--csv"), (["man", "stpo"], "stop")):
+                                  (["identify", "--cvs", "x"], "--csv"), (["man", "stpo"], "stop"),
+                                  (["tune", "--phase-margn", "3"], "--phase-margin-deg"),
+                                  (["export", "--run", "1", "--format", "matt", "--to", "x"], "mat"),
+                                  (["completion", "bsh"], "bash")):
             done = run(*words)
             self.assertEqual(done.returncode, 2)
             self.assertIn(f", did you mean {suggestion}?", done.stderr)
         self.assertNotIn("did you mean", run("xyzzy").stderr)
         self.assertEqual(run().returncode, 2)
         self.assertEqual(run("nonsense", program="rheonaut-sim").returncode, 2)
+
+    def test_a_name_or_value_that_there_is_not_is_a_mistake_too(self):
+        for program, words, text in (
+                ("rheonaut", ["profile", "figure_77"], "; did you mean figure_7?"),
+                ("rheonaut-sim", ["play", "figure_77"], "; did you mean figure_7?"),
+                ("rheonaut-sim", ["scenarios", "--show", "bad_dya"], "; did you mean bad_day?"),
+                ("rheonaut-sim", ["--station", "127.0.0.1"], "'127.0.0.1' is not ADDR:PORT"),
+                ("rheonaut-sim", ["--station", "127.0.0.1:1", "--fluid", "watr"], "is 'watr', did you mean water?"),
+                ("rheonaut-sim", ["--station", "127.0.0.1:1", "--data", "x"], "--data"),
+                ("rheonaut-sim", [], "--station or --data is required")):
+            with self.subTest(words=words):
+                done = run(*words, program=program)
+                self.assertEqual((done.returncode, done.stdout), (2, ""), done)
+                self.assertRegex(done.stderr, rf"^{program}: [^\n]*{re.escape(text)}[^\n]*\n$")
+
+    def test_every_program_and_command_says_its_version(self):
+        version = run("--version").stdout
+        self.assertRegex(version, r"^\d+\.\d+\.\d+\n$")
+        for program in ("rheonaut-sim", "rheonaut-export"):
+            self.assertEqual(run("--version", program=program).stdout, version)
+        for command in COMMANDS:
+            done = run(*command.words, "--version")
+            self.assertEqual((done.returncode, done.stdout), (0, version), command.words)
+
+    def test_a_folder_without_a_station_is_named(self):
+        with tempfile.TemporaryDirectory() as folder:
+            text = f"rheonaut: there is no folder '{folder}/none'; --data names that of a station\n"
+            for words in (["login-link"], ["fluid", "list"], ["watch"]):
+                done = run(*words, "--data", f"{folder}/none")
+                self.assertEqual((done.returncode, done.stdout, done.stderr), (1, "", text))
+            done = run("--data", folder, program="rheonaut-sim")
+            self.assertEqual(done.returncode, 1)
+            self.assertIn(f"no station runs in '{folder}'", done.stderr)
 
     def test_exit_statuses_of_the_manual_are_those_of_the_documents(self):
         page = run("man").stdout

@@ -1,22 +1,30 @@
-// The queries of docs/database.md work as they stand, with the stock sqlite3 program.
+// The queries of docs/database.md work as they stand, with the stock sqlite3 program: on a station's database, and
+// those over views on an exported run too.
 #include <array>
 #include <cstdio>
 #include <fstream>
 #include <sstream>
 #include <string>
 
+#include "server/storage/database/database.hpp"
 #include "server/storage/database/schema.hpp"
+#include "server/storage/export/run_file.hpp"
+#include "server/storage/query/run_reader.hpp"
 #include "tests/server/recording/recording_test.hpp"
 
 namespace server {
 namespace {
 
-// The blocks between ```sql and ```.
-std::vector<std::string> documented_queries() {
+// The heading of those that need a station's tables.
+constexpr const char* kOfAStation = "### Only in a station's database";
+
+// The blocks between ```sql and ```, up to that line.
+std::vector<std::string> documented_queries(const std::string& end = "") {
   std::ifstream document{DATABASE_DOCUMENT};
   std::vector<std::string> queries;
   bool inside = false;
   for (std::string line; std::getline(document, line);) {
+    if (!end.empty() && line == end) break;
     if (line == "```sql") {
       queries.emplace_back();
       inside = true;
@@ -43,10 +51,11 @@ class DocumentedQueries : public RecordingTest {
     std::string output;  // and errors
   };
 
-  Answer ask(const std::string& query) {
+  Answer ask(const std::string& query) { return ask(path_, query); }
+  Answer ask(const std::filesystem::path& database, const std::string& query) {
     std::ofstream{folder_ / "query.sql"} << query;
     const std::string command =
-        "sqlite3 -readonly -bail -list '" + path_.string() + "' < '" + (folder_ / "query.sql").string() + "' 2>&1";
+        "sqlite3 -readonly -bail -list '" + database.string() + "' < '" + (folder_ / "query.sql").string() + "' 2>&1";
     FILE* pipe = popen(command.c_str(), "r");
     Answer answer;
     std::array<char, 4096> buffer{};
@@ -55,6 +64,16 @@ class DocumentedQueries : public RecordingTest {
     }
     answer.status = pclose(pipe);
     return answer;
+  }
+
+  std::filesystem::path exported() {
+    auto spans = wait(recording_->exports.spans(storage::excerpt_of(1))).value();
+    for (storage::RecordedSpan& span : spans) span.cut(span.made());
+    SQLite::Database database = storage::open_for_reading(path_);
+    storage::RunFile writer{folder_ / "run-1.sqlite", storage::reading_uri(path_, false), std::move(spans),
+                            storage::ExportQuery{.run = 1, .channels = storage::all_channels(), .grid_us = {}}};
+    while (writer.advance(database)) continue;
+    return folder_ / "run-1.sqlite";
   }
 
   // One run of 300 samples with a gap, an event, a command and a marker.
@@ -73,15 +92,30 @@ class DocumentedQueries : public RecordingTest {
     station::RobotEvent event;
     event.robot_id = robot.id;
     event.kind = "connected";
+    event.received_at_us = clock_.utc_us();
     recorder_->on_event(state_of(robot, station::LinkState::connected), event);
     station::CommandRecord command;
     command.id = ~0ULL;
     command.robot_id = robot.id;
+    command.submitted_at_us = clock_.utc_us();
     recorder_->on_command(command);
     station::AuditNote refused;
     refused.action = "command.refused";
+    refused.robot_id = robot.id;
     refused.detail = R"({"problem":"duty = 7 is outside -1 to 1"})";
     recorder_->on_audit(refused);
+    recorder_->on_in_force(station::RobotState{}, {.boot_id = robot.boot_id,
+                                                   .is_change = false,
+                                                   .first_seq = 0,
+                                                   .content = station::ReportedParameters{{"a", {}}},
+                                                   .noticed_at_us = clock_.utc_us()});
+    for (const std::uint64_t robot_time_us : {100'000ULL, 700'000ULL, 1'500'000ULL, 99'000'000ULL}) {
+      station::ClockRecord estimate;
+      estimate.boot_id = robot.boot_id;
+      estimate.robot_time_us = robot_time_us;
+      estimate.utc_offset_us = 1'700'000'000'000'000;
+      recorder_->on_clock(station::RobotState{}, estimate);
+    }
     flush();
     ASSERT_TRUE(wait(recording_->markers.add({robot.id, "glucose in", "", std::nullopt, robot.boot_id})).has_value());
   }
@@ -97,6 +131,48 @@ TEST_F(DocumentedQueries, AllRunAndAnswerWhileTheStationRecords) {
     EXPECT_EQ(answer.status, 0) << answer.output;
     EXPECT_FALSE(answer.output.empty());
   }
+}
+
+TEST_F(DocumentedQueries, ThoseOverViewsRunOnAnExportedRun) {
+  record();
+  const std::filesystem::path file = exported();
+  const std::vector<std::string> queries = documented_queries(kOfAStation);
+  EXPECT_GE(queries.size(), 10u);
+  EXPECT_LT(queries.size(), documented_queries().size()) << "the heading is no longer there";
+  for (const std::string& query : queries) {
+    SCOPED_TRACE(query);
+    const Answer answer = ask(file, query);
+    EXPECT_EQ(answer.status, 0) << answer.output;
+    EXPECT_FALSE(answer.output.empty());
+  }
+}
+
+TEST_F(DocumentedQueries, AnExportedRunHasTheStationsViewsWithTheSameRows) {
+  record();
+  const std::filesystem::path file = exported();
+  const std::string views =
+      "SELECT made.name, field.name FROM sqlite_schema AS made, pragma_table_info(made.name) AS field"
+      " WHERE made.type = 'view' ORDER BY made.name, field.cid";
+  EXPECT_EQ(ask(file, views).output, ask(views).output);
+  EXPECT_NE(ask(views).output.find("run_sample|run_id\n"), std::string::npos);
+  for (const char* view : {"run_sample", "run_gap", "run_marker", "run_in_force"}) {
+    SCOPED_TRACE(view);
+    const std::string rows = std::string{"SELECT * FROM "} + view + " WHERE run_id = 1";
+    EXPECT_EQ(ask(file, rows).output, ask(rows).output);
+    EXPECT_FALSE(ask(file, rows).output.empty());
+  }
+  for (const char* view : {"robot_boot", "robot_command"}) {
+    SCOPED_TRACE(view);
+    const std::string rows = std::string{"SELECT * FROM "} + view;
+    EXPECT_EQ(ask(file, rows).output, ask(rows).output);
+    EXPECT_FALSE(ask(file, rows).output.empty());
+  }
+  // Of the estimates the last one before the run, and those within it.
+  const std::string of_the_run = "SELECT * FROM boot_clock WHERE robot_time_us BETWEEN 700000 AND 1500000";
+  EXPECT_EQ(ask(file, "SELECT * FROM boot_clock").output, ask(of_the_run).output);
+  EXPECT_FALSE(ask(of_the_run).output.empty());
+  EXPECT_EQ(ask(file, "SELECT samples, cause FROM robot_gap").output,
+            ask("SELECT samples, cause FROM robot_gap").output);
 }
 
 TEST_F(DocumentedQueries, RunSampleGivesEverySampleOfTheRunInOrder) {

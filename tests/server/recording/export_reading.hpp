@@ -40,6 +40,18 @@ inline std::vector<std::string> split(const std::string& line, char separator) {
 
 inline std::string joined(const std::vector<std::string>& fields) { return fmt::format("{}", fmt::join(fields, " ")); }
 
+// t_s of rows is the time since the first row of its span, to the last bit.
+class SpanTimes {
+ public:
+  void expect(std::uint32_t span, std::int64_t robot_time_us, double t_s) {
+    const std::int64_t begin_us = begin_us_.try_emplace(span, robot_time_us).first->second;
+    EXPECT_EQ(t_s, static_cast<double>(robot_time_us - begin_us) / 1e6) << "span " << span << ", " << robot_time_us;
+  }
+
+ private:
+  std::map<std::uint32_t, std::int64_t> begin_us_;
+};
+
 class ExportTest : public RandomRecordingTest {
  protected:
   std::vector<storage::RecordedSpan> spans_of(storage::RunId run) {
@@ -98,18 +110,22 @@ class ExportTest : public RandomRecordingTest {
     std::string line;
     std::getline(in, line);
     EXPECT_EQ(line,
-              "span,boot_id,seq,robot_time_us,utc,position_m,velocity_m_s,acceleration_m_s2,duty,impedance_mv,"
+              "span,boot_id,seq,robot_time_us,t_s,utc,position_m,velocity_m_s,acceleration_m_s2,duty,impedance_mv,"
               "reference_m,mode,sub_state,setpoint_m,disturbance_m,clock_uncertainty_us,first_received_at_us,"
               "received_at_us,position_sd_m,controller_id,emergency_id,emergency_cause,flags,gap_before,gap_after,"
               "unknown_values");
     Lines lines;
+    SpanTimes times;
     while (std::getline(in, line)) {
       const std::size_t end = line.find(",\"{") != std::string::npos ? line.find(",\"{") : line.size() - 1;
       std::string unknown = line.substr(end + 1);  // {""mode"":17} in quotation marks, or nothing
       if (!unknown.empty()) unknown = unknown.substr(1, unknown.size() - 2);
       for (std::size_t at; (at = unknown.find("\"\"")) != std::string::npos;) unknown.erase(at, 1);
       std::vector<std::string> fields = split(line.substr(0, end), ',');
-      EXPECT_EQ(fields.size(), 25u) << line;
+      EXPECT_EQ(fields.size(), 26u) << line;
+      times.expect(static_cast<std::uint32_t>(std::stoul(fields.at(0))), std::stoll(fields.at(3)),
+                   std::stod(fields.at(4)));
+      fields.erase(fields.begin() + 4);
       fields.at(4) = std::to_string(utc_us_of(fields.at(4)));
       for (const std::size_t column : {5U, 6U, 7U, 8U, 9U, 10U, 13U, 14U, 18U})
         fields.at(column) = bits_of(fields.at(column));
@@ -152,9 +168,14 @@ class ExportTest : public RandomRecordingTest {
 
   static Lines gaps_in(const std::filesystem::path& file) {
     SQLite::Database database{file.string(), SQLite::OPEN_READONLY};
-    SQLite::Statement query{database, "SELECT gap_before || ' ' || gap_after FROM sample ORDER BY rowid"};
+    SQLite::Statement query{
+        database, "SELECT gap_before || ' ' || gap_after, span, robot_time_us, t_s FROM sample ORDER BY rowid"};
     Lines lines;
-    while (query.executeStep()) lines.push_back(query.getColumn(0).getString());
+    SpanTimes times;
+    while (query.executeStep()) {
+      lines.push_back(query.getColumn(0).getString());
+      times.expect(query.getColumn(1).getUInt(), query.getColumn(2).getInt64(), query.getColumn(3).getDouble());
+    }
     return lines;
   }
 
@@ -162,7 +183,17 @@ class ExportTest : public RandomRecordingTest {
   struct Variable {
     std::vector<double> numbers;
     std::vector<float> singles;
+    std::vector<std::uint64_t> ids;
+    std::vector<std::string> texts;  // without the blanks at the end
   };
+  static std::string row_of_text(const matvar_t& text, std::size_t row) {
+    std::string out;
+    for (std::size_t place = 0; place < text.dims[1]; ++place) {
+      out +=
+          static_cast<const char*>(text.data)[(place * text.dims[0] + row) * static_cast<std::size_t>(text.data_size)];
+    }
+    return out.substr(0, out.find_last_not_of(' ') + 1);
+  }
   static std::map<std::string, Variable> variables_of(const std::filesystem::path& path) {
     std::map<std::string, Variable> variables;
     const std::unique_ptr<mat_t, int (*)(mat_t*)> file{Mat_Open(path.c_str(), MAT_ACC_RDONLY), Mat_Close};
@@ -172,12 +203,14 @@ class ExportTest : public RandomRecordingTest {
       Variable& into = variables[variable->name];
       if (variable->class_type == MAT_C_STRUCT) continue;
       EXPECT_EQ(variable->rank, 2);
-      EXPECT_EQ(variable->dims[1], 1u);
+      if (variable->class_type != MAT_C_CHAR) EXPECT_EQ(variable->dims[1], 1u);
       for (std::size_t row = 0; row < variable->dims[0]; ++row) {
         if (variable->class_type == MAT_C_DOUBLE) into.numbers.push_back(static_cast<double*>(variable->data)[row]);
         if (variable->class_type == MAT_C_UINT32)
           into.numbers.push_back(static_cast<std::uint32_t*>(variable->data)[row]);
         if (variable->class_type == MAT_C_SINGLE) into.singles.push_back(static_cast<float*>(variable->data)[row]);
+        if (variable->class_type == MAT_C_UINT64) into.ids.push_back(static_cast<std::uint64_t*>(variable->data)[row]);
+        if (variable->class_type == MAT_C_CHAR) into.texts.push_back(row_of_text(*variable, row));
       }
     }
     return variables;
@@ -193,23 +226,25 @@ class ExportTest : public RandomRecordingTest {
 
   Lines mat_lines(storage::RunId run) {
     const auto variables = variables_of(mat({.run = run, .channels = storage::all_channels(), .grid_us = {}}));
-    const auto spans = spans_of(run);
     const auto number = [&](const char* name, std::size_t row) {
       return static_cast<std::int64_t>(variables.at(name).numbers.at(row));
     };
     const auto single = [&](const char* name, std::size_t row) { return bits(variables.at(name).singles.at(row)); };
+    const auto id = [&](const char* name, std::size_t row) { return variables.at(name).ids.at(row); };
+    const auto text_of = [&](const char* name, std::size_t row) { return variables.at(name).texts.at(row); };
     Lines lines;
+    SpanTimes times;
     for (std::size_t row = 0; row < variables.at("span").numbers.size(); ++row) {
-      const auto span = static_cast<std::size_t>(number("span", row));
-      const std::uint64_t emergency_id = static_cast<std::uint64_t>(number("emergency_id_high", row)) << 32 |
-                                         static_cast<std::uint64_t>(number("emergency_id_low", row));
-      std::vector<std::string> fields{fmt::format("{} {} {} {} {}", span, spans.at(span).boot_id, number("seq", row),
-                                                  number("robot_time_us", row), number("utc_us", row))};
+      times.expect(static_cast<std::uint32_t>(number("span", row)), number("robot_time_us", row),
+                   variables.at("t_s").numbers.at(row));
+      std::vector<std::string> fields{fmt::format("{} {} {} {} {}", number("span", row), id("boot_id", row),
+                                                  number("seq", row), number("robot_time_us", row),
+                                                  number("utc_us", row))};
       for (std::size_t channel = 0; channel < storage::kChannels; ++channel) {
         fields.push_back(single(text(static_cast<storage::Channel>(channel)), row));
       }
-      fields.emplace_back(protocol::text(static_cast<protocol::Mode>(number("mode", row))));
-      fields.emplace_back(protocol::text(static_cast<protocol::SubState>(number("sub_state", row))));
+      fields.push_back(text_of("mode_text", row));
+      fields.push_back(text_of("sub_state_text", row));
       fields.push_back(single("setpoint_m", row));
       fields.push_back(single("disturbance_m", row));
       fields.push_back(fmt::format("{} {} {}", number("clock_uncertainty_us", row), number("first_received_at_us", row),
@@ -221,8 +256,8 @@ class ExportTest : public RandomRecordingTest {
                                .add("sub_state", static_cast<protocol::SubState>(number("sub_state", row)))
                                .add("emergency_cause", cause)
                                .text();
-      fields.push_back(fmt::format("{} {} {} {} {} {} {}", number("controller_id", row), emergency_id,
-                                   protocol::text(cause), number("flags", row), unknown.value_or("none"),
+      fields.push_back(fmt::format("{} {} {} {} {} {} {}", number("controller_id", row), id("emergency_id", row),
+                                   text_of("emergency_cause_text", row), number("flags", row), unknown.value_or("none"),
                                    number("gap_before", row), number("gap_after", row)));
       lines.push_back(joined(fields));
     }

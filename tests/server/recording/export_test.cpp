@@ -47,6 +47,15 @@ TEST_F(ExportTest, ARunFileHoldsTheRunsOtherRowsAndIsNoStationsDatabase) {
   EXPECT_EQ(value("SELECT count(*) FROM span"), "2");
   EXPECT_EQ(value("SELECT sum(last_seq - first_seq + 1) FROM gap"),
             rows("SELECT sum(last_seq - first_seq + 1) FROM run_gap").at(0));
+  EXPECT_EQ(value("SELECT group_concat(name) FROM sqlite_schema WHERE type IN ('table', 'view') AND name NOT IN"
+                  " (SELECT name FROM about WHERE column_name IS NULL AND meaning <> '')"),
+            "");
+  EXPECT_EQ(value("SELECT group_concat(made.name || '.' || field.name) FROM sqlite_schema AS made,"
+                  " pragma_table_info(made.name) AS field WHERE made.type IN ('table', 'view') AND NOT EXISTS"
+                  " (SELECT 1 FROM about WHERE about.name = made.name AND column_name = field.name AND meaning <> '')"),
+            "")
+      << "give each a row in run_file_about.cpp";
+  EXPECT_EQ(value("SELECT group_concat(name) FROM about WHERE name NOT IN (SELECT name FROM sqlite_schema)"), "");
   EXPECT_FALSE(std::filesystem::exists(file.string() + "-wal"));
   kill();
   EXPECT_THROW(storage::Database{file}, std::exception);
@@ -178,20 +187,22 @@ TEST_F(ExportTest, AGridAndChosenChannelsAreTheSameInCsvAndMat) {
   std::istringstream in{csv(query)};
   std::string line;
   std::getline(in, line);
-  EXPECT_EQ(line, "span,t_s,utc,velocity_m_s,duty,setpoint_m,gap");
+  EXPECT_EQ(line, "span,t_s,utc,velocity_m_s,duty,setpoint_m,mode,gap");
   std::size_t row = 0;
   int gaps = 0;
   for (; std::getline(in, line); ++row) {
     const std::vector<std::string> fields = split(line, ',');
-    ASSERT_EQ(fields.size(), 7u);
+    ASSERT_EQ(fields.size(), 8u);
     EXPECT_EQ(std::stod(fields[0]), variables.at("span").numbers.at(row));
     EXPECT_NEAR(std::stod(fields[1]), variables.at("t_s").numbers.at(row), 1e-9);
     EXPECT_EQ(utc_us_of(fields[2]), static_cast<std::int64_t>(variables.at("utc_us").numbers.at(row)));
     EXPECT_EQ(bits_of(fields[3]), bits(variables.at("velocity_m_s").singles.at(row)));
     EXPECT_EQ(bits_of(fields[4]), bits(variables.at("duty").singles.at(row)));
     EXPECT_EQ(bits_of(fields[5]), bits(variables.at("setpoint_m").singles.at(row)));
-    EXPECT_EQ(std::stod(fields[6]), variables.at("gap").numbers.at(row));
-    gaps += fields[6] == "1";
+    EXPECT_EQ(fields[6], variables.at("mode_text").texts.at(row));
+    EXPECT_EQ(fields[6].empty(), fields[7] == "1");
+    EXPECT_EQ(std::stod(fields[7]), variables.at("gap").numbers.at(row));
+    gaps += fields[7] == "1";
   }
   EXPECT_EQ(row, variables.at("gap").numbers.size());
   EXPECT_GT(gaps, 0);
@@ -212,7 +223,10 @@ TEST_F(ExportTest, AMatFileSaysWhatIsKnownOfTheRun) {
   };
   EXPECT_EQ(field("name"), "everything");
   EXPECT_EQ(field("robot_id"), robot_.id);
-  EXPECT_EQ(field("boot_ids"), fmt::format("0 {}, 1 {}", robot_.boot_id - 1, robot_.boot_id));
+  const matvar_t* boots = Mat_VarGetStructFieldByName(facts.get(), "boot_ids", 0);
+  ASSERT_TRUE(boots != nullptr && boots->class_type == MAT_C_UINT64 && boots->dims[0] == 2);
+  EXPECT_EQ(static_cast<const std::uint64_t*>(boots->data)[0], robot_.boot_id - 1);
+  EXPECT_EQ(static_cast<const std::uint64_t*>(boots->data)[1], robot_.boot_id);
   EXPECT_NE(field("modes").find(fmt::format("{} auto", static_cast<int>(rheonaut_MODE_AUTO))), std::string::npos);
 }
 

@@ -1,7 +1,39 @@
-// The one calm screen for a page that the station does not know: the printed link, or user and password.
+// The one calm screen for a page that the station does not know: a one-time link, or user and password.
 
 import { useSignal } from '@preact/signals';
 import type { Session } from '../session';
+
+const MakeLink = () => (
+  <p>
+    <code>rheonaut login-link --data FOLDER</code>
+  </p>
+);
+
+// The station answers a link that is no longer valid with this page, at the link's own address.
+function OldLink() {
+  return (
+    <>
+      <h1>This link is no longer valid</h1>
+      <p>
+        A link signs one browser in, once, and only within 10 minutes. On the station’s machine this makes a new one:
+      </p>
+      <MakeLink />
+    </>
+  );
+}
+
+function NoLink() {
+  return (
+    <>
+      <h1>Open the link that the station printed</h1>
+      <p>
+        This browser is not signed in. The station printed a one-time link when it started; it looks like{' '}
+        <code>{location.origin}/login?code=…</code>. On the station’s machine this makes another:
+      </p>
+      <MakeLink />
+    </>
+  );
+}
 
 export function SignedOut({ session }: { session: Session }) {
   const user = useSignal('');
@@ -14,6 +46,7 @@ export function SignedOut({ session }: { session: Session }) {
     error.value = '';
     try {
       await session.log_in(user.value.trim(), password.value);
+      if (location.pathname === '/login') history.replaceState(null, '', '/'); // a reload does not ask for the old link
     } catch (failure) {
       error.value = failure instanceof Error ? failure.message : String(failure);
       password.value = '';
@@ -23,11 +56,7 @@ export function SignedOut({ session }: { session: Session }) {
 
   return (
     <main class="signed-out">
-      <h1>Open the link that the station printed</h1>
-      <p>
-        This browser is not signed in. The station printed a one-time link when it started; it looks like{' '}
-        <code>{location.origin}/login?code=…</code>
-      </p>
+      {location.pathname === '/login' ? <OldLink /> : <NoLink />}
       <form
         aria-label="Sign in"
         onSubmit={(event) => {

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <cstring>
 #include <system_error>
 #include <utility>
 
@@ -17,9 +18,10 @@ constexpr std::size_t kBufferBytes = 64 * 1024;
 constexpr std::size_t kCopyBytes = 4 * 1024 * 1024;
 
 // By Type.
-constexpr std::uint32_t kElementTypes[] = {9, 7, 6};  // miDOUBLE, miSINGLE, miUINT32
-constexpr std::uint32_t kClasses[] = {6, 7, 13};      // mxDOUBLE_CLASS, mxSINGLE_CLASS, mxUINT32_CLASS
-constexpr std::uint64_t kValueBytes[] = {8, 4, 4};
+constexpr std::uint32_t kElementTypes[] = {9, 7, 6, 13, 16};  // miDOUBLE, miSINGLE, miUINT32, miUINT64, miUTF8
+constexpr std::uint32_t kClasses[] = {6, 7, 13, 15, 4};       // mxDOUBLE_CLASS, …_SINGLE, …_UINT32, …_UINT64, …_CHAR
+constexpr std::uint64_t kValueBytes[] = {8, 4, 4, 8, 1};      // in the MAT file
+constexpr std::uint64_t kPushedBytes[] = {8, 4, 4, 8, sizeof(std::uint32_t)};
 constexpr std::uint32_t kInt8 = 1, kInt32 = 5, kUint32 = 6, kMatrix = 14;
 
 [[noreturn]] void fail_with(const std::string& what) { throw std::system_error{errno, std::generic_category(), what}; }
@@ -53,8 +55,8 @@ void write_all(int file, const void* bytes, std::size_t size) {
   }
 }
 
-MatColumn::MatColumn(std::string name, Type type, const std::filesystem::path& folder)
-    : name_{std::move(name)}, type_{type}, file_{unlinked_file(folder)} {}
+MatColumn::MatColumn(std::string name, Type type, const std::filesystem::path& folder, std::vector<std::string> words)
+    : name_{std::move(name)}, type_{type}, words_{std::move(words)}, file_{unlinked_file(folder)} {}
 
 MatColumn::~MatColumn() {
   if (file_ >= 0) ::close(file_);
@@ -63,15 +65,16 @@ MatColumn::~MatColumn() {
 MatColumn::MatColumn(MatColumn&& other) noexcept
     : name_{std::move(other.name_)},
       type_{other.type_},
+      words_{std::move(other.words_)},
       file_{std::exchange(other.file_, -1)},
       buffer_{std::move(other.buffer_)},
-      size_bytes_{other.size_bytes_},
+      pushed_bytes_{other.pushed_bytes_},
       copied_bytes_{other.copied_bytes_},
       begun_{other.begun_} {}
 
 void MatColumn::append(const void* bytes, std::size_t size) {
   buffer_.append(static_cast<const char*>(bytes), size);
-  size_bytes_ += size;
+  pushed_bytes_ += size;
   if (buffer_.size() >= kBufferBytes) flush();
 }
 
@@ -80,19 +83,57 @@ void MatColumn::flush() {
   buffer_.clear();
 }
 
+std::uint64_t MatColumn::rows() const { return pushed_bytes_ / kPushedBytes[static_cast<std::size_t>(type_)]; }
+
+std::uint64_t MatColumn::value_bytes() const { return kValueBytes[static_cast<std::size_t>(type_)]; }
+
+std::uint64_t MatColumn::width() const {
+  if (type_ != Type::text) return 1;
+  std::size_t longest = 0;
+  for (const std::string& word : words_) longest = std::max(longest, word.size());
+  return longest;
+}
+
 std::string MatColumn::element_beginning() const {
   const auto type = static_cast<std::size_t>(type_);
-  const std::uint64_t rows = size_bytes_ / kValueBytes[type];
   std::string rest;
   append_words(rest, {kUint32, 8, kClasses[type], 0});
-  append_words(rest, {kInt32, 8, rows, 1});
+  append_words(rest, {kInt32, 8, rows(), width()});
   append_words(rest, {kInt8, name_.size()});
   rest += name_;
   rest.resize(padded(rest.size()), '\0');
-  append_words(rest, {kElementTypes[type], size_bytes_});
+  append_words(rest, {kElementTypes[type], size_bytes()});
   std::string element;
-  append_words(element, {kMatrix, rest.size() + padded(size_bytes_)});
+  append_words(element, {kMatrix, rest.size() + padded(size_bytes())});
   return element + rest;
+}
+
+std::string MatColumn::read(std::uint64_t from, std::uint64_t size) const {
+  std::string bytes(std::min<std::uint64_t>(kCopyBytes, size), '\0');
+  const ssize_t done = ::pread(file_, bytes.data(), bytes.size(), static_cast<off_t>(from));
+  if (done < 0) fail_with("cannot read an export");
+  bytes.resize(static_cast<std::size_t>(done));
+  return bytes;
+}
+
+// Of the matrix' column `place`, from that row on.
+std::string MatColumn::characters(std::uint64_t place, std::uint64_t first_row) const {
+  const std::string numbers = read(first_row * sizeof(std::uint32_t), (rows() - first_row) * sizeof(std::uint32_t));
+  std::string out;
+  for (std::size_t offset = 0; offset + sizeof(std::uint32_t) <= numbers.size(); offset += sizeof(std::uint32_t)) {
+    std::uint32_t number = 0;
+    std::memcpy(&number, &numbers[offset], sizeof number);
+    const std::string& word = words_[std::min<std::size_t>(number, words_.size() - 1)];
+    out += number != kNoWord && place < word.size() ? word[place] : ' ';
+  }
+  return out;
+}
+
+// Those after what is copied; not empty before the end.
+std::string MatColumn::next_values() const {
+  if (copied_bytes_ == size_bytes()) return {};
+  if (type_ == Type::text) return characters(copied_bytes_ / rows(), copied_bytes_ % rows());
+  return read(copied_bytes_, size_bytes() - copied_bytes_);
 }
 
 bool MatColumn::copy_some(int file) {
@@ -102,13 +143,11 @@ bool MatColumn::copy_some(int file) {
     write_all(file, beginning.data(), beginning.size());
     begun_ = true;
   }
-  std::string piece(std::min<std::uint64_t>(kCopyBytes, size_bytes_ - copied_bytes_), '\0');
-  const ssize_t size = ::pread(file_, piece.data(), piece.size(), static_cast<off_t>(copied_bytes_));
-  if (size < 0) fail_with("cannot read an export");
-  write_all(file, piece.data(), static_cast<std::size_t>(size));
-  copied_bytes_ += static_cast<std::uint64_t>(size);
-  if (copied_bytes_ < size_bytes_) return true;
-  const std::string pad(padded(size_bytes_) - size_bytes_, '\0');
+  const std::string values = next_values();
+  write_all(file, values.data(), values.size());
+  copied_bytes_ += values.size();
+  if (copied_bytes_ < size_bytes()) return true;
+  const std::string pad(padded(size_bytes()) - size_bytes(), '\0');
   write_all(file, pad.data(), pad.size());
   return false;
 }

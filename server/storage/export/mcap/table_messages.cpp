@@ -43,8 +43,11 @@ void append_value(std::string& out, const SQLite::Column& value) {
     out += base::dump(value.getString());
     return;
   }
+  const double number = value.getDouble();
+  const auto single = static_cast<float>(number);
+  if (static_cast<double>(single) == number) return base::append_float(out, single, "");
   char digits[32];
-  out.append(digits, std::to_chars(digits, digits + sizeof digits, value.getDouble()).ptr);
+  out.append(digits, std::to_chars(digits, digits + sizeof digits, number).ptr);
 }
 
 void append_row(std::string& out, SQLite::Statement& row) {

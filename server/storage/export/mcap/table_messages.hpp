@@ -1,7 +1,8 @@
 // The rows of a table as messages in JSON: a member for each column that has a value, under its name.
 //
-// Integers and texts as they are, numbers as the shortest decimal that gives the same binary64 back.
-// On the thread that owns the handle; throws when the disk does not take it.
+// Integers and texts as they are. A number that is exactly a binary32, as all of a robot are, is the shortest decimal
+// that gives this binary32 back (0.9), any other one the shortest that gives the same binary64 back. On the thread that
+// owns the handle; throws when the disk does not take it.
 #pragma once
 
 #include <SQLiteCpp/SQLiteCpp.h>
