@@ -118,7 +118,7 @@ class Tree:
             text += own
             for name in re.findall(r"^(?:from|import) (\w+)", own, re.M):
                 waiting += [path.parent / f"{name}.py", self.root / "deploy" / f"{name}.py",
-                            self.root / "tests/system" / f"{name}.py"]
+                            self.root / "tests/system" / f"{name}.py", self.root / "tests/model" / f"{name}.py"]
             waiting += [path.parent / name for name in re.findall(r"from '\./([^']+)'", own)]
         return text, {path.relative_to(self.root).as_posix() for path in seen}
 
