@@ -121,7 +121,8 @@ class Tree:
             text += own
             for name in re.findall(r"^(?:from|import) (\w+)", own, re.M):
                 waiting += [path.parent / f"{name}.py", self.root / "deploy" / f"{name}.py",
-                            self.root / "tests/system" / f"{name}.py", self.root / "examples" / f"{name}.py"]
+                            self.root / "tests/system" / f"{name}.py", self.root / "tests/model" / f"{name}.py",
+                            self.root / "examples" / f"{name}.py"]
             waiting += [path.parent / name for name in re.findall(r"from '\./([^']+)'", own)]
         return text, {path.relative_to(self.root).as_posix() for path in seen}
 

@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
 """Checks that docs/safety.md agrees with the code: each row of its tables names a guard, a test and a bound that are there.
 
-A guard is a mark `SAFETY:` in robot_fw/, server/ or protocol/ (those of the page, in web/src, are not compared). The page quotes it as `path`: "the words that follow the
-mark in its line", and lists each mark once, in a table of failures or in the table of the other guards. A test is
-`Suite.Name` (GoogleTest), `tests/system/x_test.py test_y` or `web/tests/x.ts "title"`; its file must be one that is
-built and run. Prints `docs/safety.md: what is wrong` and fails if anything is.
+A guard is a mark `SAFETY:` in robot_fw/, server/, protocol/ or web/src/. The document quotes it as `path`: "the words that
+follow the mark in its line", and lists each mark once: in a table of failures, in the table of the other guards, or, one of
+the cockpit, with its test in the table of the page's guards. A test is `Suite.Name` (GoogleTest), `tests/system/x_test.py
+test_y`, `web/tests/x.ts` "title" or `tests/browser/x_test.mjs` "title"; its file must be one that is built and run. Prints `docs/safety.md: what is wrong` and fails if anything is.
 """
 import collections
 import pathlib
@@ -12,9 +12,11 @@ import re
 import sys
 
 PAGE = "docs/safety.md"
-GUARDED = ("robot_fw", "server", "protocol")
+GUARDED = ("robot_fw", "server", "protocol", "web/src")
+SOURCES = (".cpp", ".hpp", ".h", ".ino", ".proto", ".ts", ".tsx", ".css")
 GUARD = re.compile(r'`([\w./]+)`: "([^"]+)"')
 ROW = re.compile(r"^\| (\d+\.\d+) \| (.*) \|$", re.M)
+PAGE_ROW = re.compile(r'^\| (\d+\.\d+) \| (`web/src/[\w./]+`: "[^"]+") \| (.*) \|$', re.M)  # with its test
 COLUMNS = 4  # of a row of failures, without its number: what goes wrong, guard, test, what bounds it
 
 
@@ -23,11 +25,12 @@ def marks(root):
     found = collections.Counter()
     for folder in GUARDED:
         for path in sorted((root / folder).rglob("*")):
-            if not path.is_file() or path.suffix not in (".cpp", ".hpp", ".h", ".ino", ".proto"):
+            if not path.is_file() or path.suffix not in SOURCES:
                 continue
             for line in path.read_text(encoding="utf-8").splitlines():
                 if "SAFETY:" in line:
-                    found[str(path.relative_to(root)), line.partition("SAFETY:")[2].strip()] += 1
+                    words = re.sub(r"\s*\*/\}?$", "", line.partition("SAFETY:")[2].strip())
+                    found[str(path.relative_to(root)), words] += 1
     return found
 
 
@@ -56,9 +59,10 @@ def missing_test(root, known, cell):
     if titled:
         path, title = titled.groups()
         file = root / path
-        quoted = (f"test('{title}'", f'test("{title}"', f"it('{title}'")
+        quoted = (f"test('{title}'", f'test("{title}"', f"it('{title}'", f"'{title}'() {{")
         there = file.is_file() and any(q in file.read_text(encoding="utf-8").replace("\\'", "'") for q in quoted)
-        return None if there else f"no test {path} \"{title}\""
+        run = file.suffix == ".ts" or is_listed(file.name.removesuffix("_test.mjs"), file.parent / "CMakeLists.txt")
+        return None if there and run else f"no test {path} \"{title}\""
     name = cell.strip("`")
     path, separator, function = name.partition(" ")
     if not separator:
@@ -94,6 +98,13 @@ def faults(root):
             wrong = missing_test(root, known, cell)
             if wrong:
                 yield f"row {number}: {wrong}"
+    for number, guard, tests in PAGE_ROW.findall(text):
+        for cell in tests.split("<br>"):
+            wrong = missing_test(root, known, cell)
+            if wrong:
+                yield f"row {number}, {guard}: {wrong}"
+    for number, guard in re.findall(r"^\| (\d+\.\d+) \| (`web/src/[^|]*) \|$", text, re.M):
+        yield f"row {number} names no test of {guard}"
     # The tables of what was measured and of the other guards name a row of these.
     others = {number for number, _ in ROW.findall(text.replace(hazards, ""))}
     yield from (f"there is no row {number}" for number in sorted(others - rows))

@@ -9,13 +9,17 @@ from check_safety import faults
 ROW = '| 1.1 | it goes on | `robot_fw/a.cpp`: "off at once" | `Stop.Acts`<br>`tests/system/stop_test.py test_all`<br>' \
       '`web/tests/a.ts` "it stops" | 10 ms |\n'
 FILES = {
-    "docs/safety.md": "## Hazards\n" + ROW + '## The others\n| 1.1 | `server/b.hpp`: "first" |\n',
+    "docs/safety.md": "## Hazards\n" + ROW + '## The others\n| 1.1 | `server/b.hpp`: "first" |\n'
+                      '## The page\n| 1.1 | `web/src/c.tsx`: "one press" | `tests/browser/keys_test.mjs` "a press stops" |\n',
     "robot_fw/a.cpp": "int a;  // SAFETY: off at once\n",
     "server/b.hpp": "// Sends. SAFETY: first\n",
     "tests/CMakeLists.txt": "a_test.cpp\n",
     "tests/a_test.cpp": "TEST(Stop, Acts) {}\nTEST_F(Stop, Waits) {}\n",
     "tests/system/CMakeLists.txt": "foreach(name stop)\n",
     "tests/system/stop_test.py": "class A:\n    def test_all(self):\n",
+    "tests/browser/CMakeLists.txt": "foreach(name keys)\n",
+    "tests/browser/keys_test.mjs": "  async 'a press stops'() {\n",
+    "web/src/c.tsx": "{/* SAFETY: one press */}\n",
     "web/tests/a.ts": "test('it stops', () => {});\n",
 }
 
@@ -52,6 +56,15 @@ class CheckSafety(unittest.TestCase):
                          ["row 1.1: no test tests/system/stop_test.py test_all"])
         self.assertEqual(found(tests__system__CMakeLists_dot_txt=""), ["row 1.1: no test tests/system/stop_test.py test_all"])
         self.assertEqual(found(web__tests__a_dot_ts="test('it goes on')"), ['row 1.1: no test web/tests/a.ts "it stops"'])
+
+    def test_a_guard_of_the_page_has_a_test(self):
+        self.assertEqual(found(web__src__d_dot_css="/* SAFETY: grey */\n"), ['web/src/d.css has a guard without a row: "grey"'])
+        self.assertEqual(found(tests__browser__keys_test_dot_mjs="async 'a key stops'() {"),
+                         ['row 1.1, `web/src/c.tsx`: "one press": no test tests/browser/keys_test.mjs "a press stops"'])
+        self.assertEqual(found(tests__browser__CMakeLists_dot_txt="foreach(name runs)"),
+                         ['row 1.1, `web/src/c.tsx`: "one press": no test tests/browser/keys_test.mjs "a press stops"'])
+        page = FILES["docs/safety.md"].replace(' | `tests/browser/keys_test.mjs` "a press stops" |', " |")
+        self.assertEqual(found(docs__safety_dot_md=page), ['row 1.1 names no test of `web/src/c.tsx`: "one press"'])
 
     def test_rows_are_complete_and_stand_once(self):
         page = FILES["docs/safety.md"]

@@ -118,6 +118,14 @@ const steps = {
 
   async 'while latched nothing can be engaged, and clearing is guarded'() {
     assert.ok(await page.locator('#send-setpoint').isDisabled());
+    const size = page.viewportSize();
+    for (const width of [1280, 768, 390]) {
+      await page.setViewportSize({ width, height: size.height });
+      const button = page.locator('#clear-emergency');
+      const fits = await button.evaluate((one) => one.lastElementChild.offsetHeight <= one.clientHeight && one.offsetHeight >= 48);
+      assert.ok(fits, `“${await text('#clear-emergency')}” in ${width} px`);
+    }
+    await page.setViewportSize(size);
     await clear_latch();
     await nothing_moves('after the clear');
   },

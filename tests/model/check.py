@@ -80,7 +80,7 @@ class Model:
         shutil.copy(MODEL, self.folder)
         self._run("spin", "-a", MODEL.name)
         compiler = shutil.which("clang-19") or "cc"
-        self._run(compiler, "-O2", "-w", "-DSAFETY", "-DNOREDUCE", "-DHC4", "-DVECTORSZ=512", "-o", "pan", "pan.c")
+        self._run(compiler, "-O2", "-w", "-DSAFETY", "-DNOREDUCE", "-DCOLLAPSE", "-DVECTORSZ=512", "-o", "pan", "pan.c")
 
     def _run(self, *words, **environment):
         done = subprocess.run(words, cwd=self.folder, capture_output=True, text=True,

@@ -1,5 +1,9 @@
 """What a real station and robot have recorded is an execution of the model; a forged record is none."""
+import contextlib
 import copy
+import dataclasses
+import io
+import json
 import pathlib
 import signal
 import sys
@@ -9,7 +13,8 @@ import unittest
 sys.path.append(str(pathlib.Path(__file__).resolve().parents[1] / "system"))
 
 import check  # noqa: E402
-import trace  # noqa: E402
+import recorded  # noqa: E402
+import replay  # noqa: E402
 from processes import commanded, lab, wait_until  # noqa: E402
 
 
@@ -62,33 +67,61 @@ class ReplayTest(unittest.TestCase):
         self.swim(-0.1)
         self.stop_and_clear()
         self.assertEqual(place.stop_station(), 0)
-        return trace.actions(place.data / "station.sqlite", "sim-1")
+        return recorded.traces(place.data / "station.sqlite")["sim-1"]
+
+    def forged(self, **lists):
+        return recorded.is_allowed(self.model, dataclasses.replace(self.trace, **lists))
 
     def test_a_real_record_is_allowed_and_forged_ones_are_not(self):
         with lab() as place, tempfile.TemporaryDirectory() as folder:
-            robot, station = self.record(place)
+            self.trace = self.record(place)
+            self.model = check.Model(folder)
+            robot, station = self.trace.robot, self.trace.station
             print(f"robot: {robot}\nstation: {station}", flush=True)
-            model = check.Model(folder)
-            self.assertTrue(trace.is_allowed(model, robot, station))
+            self.assertEqual(self.trace.left_out, "")
+            self.assertTrue(self.forged(), "as it is")
             kinds = [action for action, _ in robot]
             for kind in ("stop", "clear", "MOVING", "duty", "automatic", "LAPSE"):
                 self.assertIn(kind, kinds)
 
             first_clear = kinds.index("clear")
             moved_before_the_clear = robot[:first_clear] + [("MOVING", 0)] + robot[first_clear:]
-            self.assertFalse(trace.is_allowed(model, moved_before_the_clear, station), "motion after a stop")
-            without_clear = robot[:first_clear] + robot[first_clear + 1:]
-            self.assertFalse(trace.is_allowed(model, without_clear, station), "no clear at all")
+            self.assertFalse(self.forged(robot=moved_before_the_clear), "motion after a stop")
+            self.assertFalse(self.forged(robot=robot[:first_clear] + robot[first_clear + 1:]), "no clear at all")
 
             duty = kinds.index("duty")
             of_the_former = robot[:duty + 1] + [("automatic", robot[0][1])] + robot[duty + 1:]
             sent = station.index(("duty", 2))
-            self.assertFalse(trace.is_allowed(model, of_the_former, station), "a command that nobody sent")
+            self.assertFalse(self.forged(robot=of_the_former), "a command that nobody sent")
             both = station[:sent + 1] + [("automatic", 1)] + station[sent + 1:]
-            self.assertFalse(trace.is_allowed(model, of_the_former, both), "a command of the former holder of control")
+            self.assertFalse(self.forged(robot=of_the_former, station=both), "a command of the former holder of control")
             lapse = kinds.index("LAPSE")
-            self.assertFalse(trace.is_allowed(model, robot[:lapse + 1] + [("MOVING", 0)] + robot[lapse + 1:], station),
+            self.assertFalse(self.forged(robot=robot[:lapse + 1] + [("MOVING", 0)] + robot[lapse + 1:]),
                              "motion after its lease has lapsed")
+            at_rest = robot[:duty + 1] + [("rest", robot[duty][1]), ("MOVING", 0)]
+            self.assertFalse(self.forged(robot=at_rest, station=station[:sent + 1] + [("rest", 2)]), "motion after a duty of 0")
+            self.leaves_its_record(place)
+
+    def leaves_its_record(self, place):
+        """As at the end of each system test; then forged ones lie beside it."""
+        with tempfile.TemporaryDirectory() as folder:
+            replay.keep(place.data / "station.sqlite", folder, "this_test_1")
+            names, kept = zip(*replay.kept(folder))
+            self.assertEqual((names, kept), ((["this_test_1 sim-1"],), (self.trace,)))
+            self.assertEqual(self.wrong_in(folder), (0, ["1 records", "1 whole"]))
+            cut = dataclasses.replace(self.trace, robot=[], station=[], left_out=recorded.SCHEDULE)
+            odd = dataclasses.replace(cut, left_out="something else")
+            forged = dataclasses.replace(self.trace, robot=[("MOVING", 0)] + self.trace.robot)
+            pathlib.Path(folder, "others_1.json").write_text(json.dumps({
+                "cut": vars(cut), "odd": vars(odd), "forged": vars(forged)}))
+            self.assertEqual(self.wrong_in(folder), (2, ["4 records", "2 beyond the model", "2 whole"]))
+
+    def wrong_in(self, folder):
+        with contextlib.redirect_stdout(io.StringIO()) as out:
+            wrong = replay.replay(self.model, folder)
+        print(out.getvalue(), flush=True)
+        total, kinds = out.getvalue().splitlines()[-1].split(": ")
+        return wrong, [total.split(", ")[0], *kinds.split(", ")]
 
 
 if __name__ == "__main__":

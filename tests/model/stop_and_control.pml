@@ -10,7 +10,7 @@
 
 /* Bounds, a rule to remove, and a trace come from the environment, so that one compilation serves all searches. */
 c_decl {
-  static struct { int stops, faults, boots, connections, restarts, tenures, eras, commands, repeats; } bound;
+  static struct { int stops, faults, boots, connections, restarts, tenures, eras, commands, repeats, operators; } bound;
   static int removed, removed_too;          /* numbers of rules; 0: none */
   static int trace[2][400], length[2];      /* actions of the robot, and of the station: 256 kind + argument */
   static int number(const char *name) {
@@ -27,7 +27,7 @@ c_decl {
     bound.stops = number("STOPS"); bound.faults = number("FAULTS"); bound.boots = number("BOOTS");
     bound.connections = number("CONNECTIONS"); bound.restarts = number("RESTARTS");
     bound.tenures = number("TENURES"); bound.eras = number("ERAS"); bound.commands = number("COMMANDS");
-    bound.repeats = number("REPEATS"); removed = number("WITHOUT");
+    bound.repeats = number("REPEATS"); bound.operators = number("OPERATORS"); removed = number("WITHOUT");
     removed_too = number("WITHOUT_TOO");
     read_actions(0, "ROBOT_TRACE"); read_actions(1, "STATION_TRACE");
   }
@@ -80,13 +80,14 @@ c_decl {
 #define ERAS        c_expr { bound.eras }
 #define COMMANDS    c_expr { bound.commands } /* other than stops and drops */
 #define REPEATS     c_expr { bound.repeats } /* of stops */
+#define OPERATORS   c_expr { bound.operators }
 #ifndef ROOM
 #define ROOM 3              /* frames in each direction of a connection */
 #endif
 
 #define EVERY_TENURE 255    /* of timed commands of which a restarted station knows nothing */
 
-mtype = { welcome, stop, clear, duty, automatic, timed, renew, drop };   /* to the robot */
+mtype = { welcome, stop, clear, duty, automatic, timed, renew, drop, rest };   /* to the robot; rest: only replayed */
 mtype = { hello, stop_ack, clear_ack, drop_ack, sample };                /* to the station */
 mtype = { at_rest, manual, in_auto };
 
@@ -107,7 +108,7 @@ byte latched_at;                     /* the moment of the latch in force */
 mtype motion = at_rest;
 byte lease;                          /* the era with which the duty ends; a renewal adds the next one */
 byte timed_of, timed_until, timed_lease, timed_stops, timed_promises;   /* one command that waits; timed_of 0: none */
-byte remembered;                     /* stops that this boot has obeyed, as bits */
+int remembered;                      /* stops that this boot has obeyed, as bits */
 bool has_sample; byte sample_latch, sample_moment, sampled = 255;
 byte held_stop, held_latch, held_moment;                /* an acknowledgement that could not be sent; 0: none */
 
@@ -145,8 +146,18 @@ bool left_trace;
 #define CONNECTED 25
 #define BOOT 26
 #define MOVING 27
+#define AT_REST 28        /* what moved has ended without a command, a lapse, a stop or a lost link */
 #define robot_next(what) c_expr { now.robot_step < length[0] && trace[0][now.robot_step] / 256 == what }
+#define STOP 8            /* as C knows these frames */
+#define CLEAR 7
+#define station_next(what) c_expr { now.station_step < length[1] && trace[1][now.station_step] / 256 == what }
 #define all_done c_expr { now.robot_step == length[0] && now.station_step == length[1] }
+/* Steps that a trace does not show are left out of a replay where nothing later in it can need them. That makes the search
+ * short; it can only refuse an execution, never allow one. */
+#define MAY_SAMPLE (!replays || FAULTS > 0)           /* else acknowledgements and hellos report each change of the latch */
+#define MAY_SEE (!replays || station_next(CLEAR))
+#define MAY_STORE (!replays || restarts < RESTARTS)
+#define MAY_STOP (!replays || (station_next(STOP) && lane == 0))   /* the station writes a stop at once */
 #define MAY_PASS (!replays || robot_next(LAPSE) || robot_next(SILENCE))
 
 inline robot_does(what, argument) {
@@ -304,6 +315,11 @@ inline run_command(kind, name, for_boot, until, whose, over, stops, promises) {
     :: kind == duty && motion == in_auto           /* wrong_mode */
     :: kind == automatic -> motion = in_auto; lease = 0; drop_timed(); robot_does(automatic, whose)
     fi
+  :: kind == rest ->
+    come_to_rest();
+    drop_timed();
+    reign = (whose > reign -> whose : reign);
+    robot_does(rest, whose)
   fi
 }
 
@@ -359,7 +375,7 @@ end:
       drop_timed()
     }
   :: atomic { faults < FAULTS && latch == 0 -> faults++; enter_emergency(); robot_does(EMERGENCY, 0) }
-  :: atomic { !has_sample && sampled != moment && connection != 0 ->
+  :: atomic { MAY_SAMPLE && !has_sample && sampled != moment && connection != 0 ->
       has_sample = true; sample_latch = latch; sample_moment = moment; sampled = moment }
   :: atomic { has_sample && connection != 0 && nfull(to_station) ->
       if
@@ -430,11 +446,13 @@ inline withdraw_queued() {
   lose_commands(queue)
 }
 
+#define only_ends_motion (queue?[drop, _, _, _, _, _, _, _] || queue?[rest, _, _, _, _, _, _, _])
+
 /* Control has ended or changed hands. */
 inline control_ended() {
   if
-  :: WITHDRAWS && queue?[drop, _, _, _, _, _, _, _]
-  :: WITHDRAWS && !queue?[drop, _, _, _, _, _, _, _] -> withdraw_queued()
+  :: WITHDRAWS && only_ends_motion
+  :: WITHDRAWS && !only_ends_motion -> withdraw_queued()
   :: !WITHDRAWS
   fi;
   if
@@ -506,7 +524,7 @@ end:
   :: atomic { served != 0 && nempty(queue) && nfull(to_robot) && (lane == 0 || !STOP_OVERTAKES) ->
       queue?kind, name, for_boot, until, whose, over, stops, promises;
       assert(lane == 0);                                          /* a stop goes ahead of everything */
-      assert(kind == drop || holder != 0 && whose == tenure);     /* nothing of a former holder of control is sent */
+      assert(kind == drop || kind == rest || holder != 0 && whose == tenure);  /* nothing of a former holder of control */
       assert(kind == drop || kind == clear || stops == asked);    /* nothing asked for before a stop is sent after it */
       write(kind, name, until, whose, over, stops, promises);
       kind = 0; name = 0; for_boot = 0; until = 0; whose = 0; over = 0; stops = 0; promises = 0
@@ -517,7 +535,7 @@ end:
   :: atomic { served != 0 && pending != 0 && lane == 0 && repeats < REPEATS -> repeats++; lane = pending }
   :: atomic { served != 0 -> station_does(SILENCE, 0); end_of_connection() }
   :: atomic { holder != 0 -> holder = 0; station_does(CONTROL, 0); control_ended() }   /* released or expired */
-  :: atomic { stored_pending != pending || stored_latch != known_latch || answerable != 0 ->
+  :: atomic { MAY_STORE && (stored_pending != pending || stored_latch != known_latch || answerable != 0) ->
       stored_pending = pending; stored_latch = known_latch; stored_moment = known_moment;
       promised = (answerable > promised -> answerable : promised); answerable = 0 }
   :: atomic { restarts < RESTARTS ->
@@ -561,7 +579,7 @@ proctype Operator(byte me) provided (!left_trace) {
   byte my_tenure;
 end:
   do
-  :: atomic { asked < STOPS && (served != 0 || pending == 0) ->   /* another stop of a robot that is away is the same */
+  :: atomic { MAY_STOP && asked < STOPS && (served != 0 || pending == 0) ->   /* another stop of a robot that is away is the same */
       asked++;
       answerable = asked;
       station_does(stop, me);
@@ -577,7 +595,7 @@ end:
       :: served == 0 && !STOP_KEPT
       fi
     }
-  :: atomic { seen_moment != known_moment || seen_latch != known_latch ->
+  :: atomic { MAY_SEE && (seen_moment != known_moment || seen_latch != known_latch) ->
       seen_latch = known_latch; seen_moment = known_moment }
   :: atomic { is_free && may_command(me) && seen_latch != 0 && (pending == 0 || !CLEAR_WAITS) ->
       command(me, clear, seen_latch, era, seen_moment) }
@@ -587,7 +605,8 @@ end:
   :: atomic { is_free && may_command(me) && !is_latched ->
       command(me, timed, 0, era + 1, asked);
       may_wait = my_tenure }
-  :: atomic { holder != 0 && holder != me && tenure < TENURES ->   /* by force, or handed over */
+  :: atomic { replays && is_free && may_command(me) -> command(me, rest, 0, era, asked) }
+  :: atomic { (replays || holder != 0 && holder != me) && tenure < TENURES ->   /* by force, or handed over; or is free */
       tenure++; holder = me; my_tenure = tenure;
       station_does(CONTROL, me);
       control_ended() }
@@ -599,13 +618,19 @@ proctype Witness() provided (!left_trace) {
 end:
   do
   :: atomic { replays && robot_next(MOVING) && moves -> robot_step++ }
+  :: atomic { replays && robot_next(AT_REST) -> come_to_rest(); drop_timed(); robot_does(AT_REST, 0) }
   :: atomic { replays && all_done -> assert(false) }
   od
 }
 
 init {
   atomic {
+    assert(stop == STOP && clear == CLEAR);
     c_code { read_environment(); };
-    run Robot(); run World(); run Station(); run Operator(1); run Operator(2); run Witness()
+    run Robot(); run World(); run Station(); run Operator(1); run Operator(2); run Witness();
+    if
+    :: OPERATORS > 2 -> run Operator(3); run Operator(4)          /* of a trace */
+    :: else
+    fi
   }
 }

@@ -1,5 +1,6 @@
 """Real stations and simulated robots as processes, for the tests in this folder. Standard library only."""
 import contextlib
+import itertools
 import os
 import pathlib
 import signal
@@ -10,10 +11,14 @@ import time
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "deploy"))
+sys.path.append(str(ROOT / "tests" / "model"))
 
+import replay  # noqa: E402
 from station_api import ApiError, Station, wait_until  # noqa: E402, F401  (used by the tests)
 
 BIN = pathlib.Path(os.environ["RHEONAUT_BIN"])  # set by CTest
+TRACES = os.environ.get("RHEONAUT_TRACES")  # a folder for what tests/model/replay.py replays; unset: nothing is kept
+NUMBERS = itertools.count(1)
 FLEET = (ROOT / "deploy" / "fleet.toml").read_text()  # a station that lets a whole fleet enrol itself
 
 
@@ -27,6 +32,7 @@ class Lab:
         self.processes = []
         self.station_process = None
         self.bin = BIN  # the programs
+        self.is_damaged = False  # the test has damaged the database: it leaves no records
 
     def _start(self, name, *arguments):
         log = open(self.folder / f"{name}.log", "ab")
@@ -88,6 +94,13 @@ class Lab:
                 process.wait()
 
 
+def keep_traces(place):
+    """What the station has recorded of its robots, as a file for the model."""
+    database = place.data / "station.sqlite"
+    if TRACES and database.exists() and not place.is_damaged:
+        replay.keep(database, TRACES, f"{pathlib.Path(sys.argv[0]).stem}_{next(NUMBERS)}")
+
+
 def commanded(station, kind, robot_id="sim-1", **arguments):
     """The answer to a command. One that a machine which stood still has let expire is given again."""
     deadline = time.monotonic() + 60
@@ -112,3 +125,4 @@ def lab(disk=None, config=None):
             raise
         finally:
             place.close()
+        keep_traces(place)

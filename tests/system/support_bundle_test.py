@@ -147,6 +147,7 @@ class SupportBundleTest(unittest.TestCase):
             place.start_station()
             place.stop_station()
             (place.data / "station.sqlite").write_bytes(b"nothing" * 5000)
+            place.is_damaged = True
             self.assertIn(b"problem  database", self.bundle(place)["doctor.txt"])
 
 

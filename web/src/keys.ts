@@ -65,7 +65,7 @@ export function listen_for_view_keys(target: KeyTarget, open: (key: string) => b
   return () => target.removeEventListener('keydown', listener, { capture: false });
 }
 
-// Of a button that stops. SAFETY: Space never stops; it belongs to "hold to run" and to text, and a button that was
+// Of a button that stops. SAFETY: Space never stops; it belongs to the held button and to text, and a button that was
 // clicked keeps the focus. Enter presses it, once however long it is held.
 export const stop_button_keys = {
   onKeyDown: (event: KeyboardEvent) => {

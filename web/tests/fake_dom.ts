@@ -59,7 +59,11 @@ export class FakeNode {
   removeEventListener(type: string): void {
     this.listeners.delete(type);
   }
+  get children(): FakeNode[] {
+    return this.childNodes.filter((child) => child.nodeType === 1);
+  }
   setPointerCapture(): void {}
+  scrollIntoView(): void {}
 
   find(id: string): FakeNode | null {
     if (this.attributes['id'] === id) return this;

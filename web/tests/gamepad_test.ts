@@ -150,6 +150,10 @@ test('a hold that ended otherwise is not taken up again: a stop, a lapse, anothe
     const before = [...world.duties];
     await frames(20);
     expect(world.duties).toEqual(before);
+    hold.press('rheo-1', 0.2); // by another hand, on the page's own button: the stick does not steer it
+    world.axis = -1;
+    await frames(20);
+    expect(world.duties).toEqual([...before, 0.2]);
   }
   const { world, frames, drive } = page();
   await drive();

@@ -149,7 +149,7 @@ export function Vessel({ session, robot }: { session: Session; robot: Robot }) {
 }
 
 // SAFETY: of a robot that is silent nothing is foretold.
-function resting_place(robot: Robot, coast: Coast | null): number | null {
+export function resting_place(robot: Robot, coast: Coast | null): number | null {
   const { estimate_m, velocity_m_s, stale, watched } = robot.readout.value;
   if (!coast || stale || !watched || estimate_m === null || velocity_m_s === null) return null;
   const distance_m = coast.distance_m(robot.ring, velocity_m_s);

@@ -136,6 +136,31 @@ test('SAFETY: a tick for sending is none for restoring; with it what it was give
   expect(page.find('design-confirm')).toBeNull();
 });
 
+test('SAFETY: the robot that is chosen in the list is the one that the stop is for', async () => {
+  vi.stubGlobal('history', { pushState: () => undefined, replaceState: () => undefined });
+  const { page, store, draw } = drawn();
+  await draw({});
+  for (const key of ['ArrowDown', 'ArrowDown', 'Enter']) {
+    page.find('design-robot')!.fire('KeyDown', { key });
+    await vi.advanceTimersByTimeAsync(100);
+  }
+  expect(store.selected_id.value).toBe('sim-2');
+});
+
+test('SAFETY: a page that is cut off sends nothing, and none to a robot that is not selected any more', async () => {
+  const { store, asked, draw, press } = drawn();
+  await draw({ controller: 8 });
+  store.is_current.value = false;
+  await press('design-push');
+  store.is_current.value = true;
+  await draw({ controller: 8 });
+  store.select('sim-2'); // and before the page is drawn again
+  await press('design-push');
+  expect(asked).toEqual([]);
+  await press('design-push');
+  expect(asked).toEqual(['8 to sim-2']);
+});
+
 test('what failed is shown for the robot and the controller that it failed with', async () => {
   const { store, draw, press, state } = drawn();
   await draw({ controller: 8 });

@@ -235,11 +235,14 @@ interface RowProps {
   on_choose(run_id: number, is_chosen: boolean): void;
 }
 
+// SAFETY: that a run is open may have changed since the station was heard.
+export const state_word = (state: Run['state'], is_current: boolean): string =>
+  state === 'open' && !is_current ? 'was open' : state;
+
 function Row({ run, is_chosen, is_current, on_choose }: RowProps) {
   const { tone, text } = completeness(run);
-  // SAFETY: that a run is open may have changed since the station was heard.
   const is_open = run.state === 'open';
-  const state = is_open ? (is_current ? 'open' : 'was open') : run.state;
+  const state = state_word(run.state, is_current);
   return (
     <tr data-run={run.run_id} class={is_chosen ? 'is-chosen' : ''}>
       <td class="pick">

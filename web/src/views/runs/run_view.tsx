@@ -124,7 +124,7 @@ function OneRun({ session, page, api, route }: Props & { page: RunPage }) {
 }
 
 // SAFETY: that a run is open may have changed since the station was heard.
-function State({ session, run }: { session: Session; run: Run }) {
+export function State({ session, run }: { session: Session; run: Run }) {
   if (run.state !== 'open') return <>{`${length_text(run)}, ${run.state}`}</>;
   return <>{session.store.is_current.value ? 'open' : 'was open when the station was last heard'}</>;
 }

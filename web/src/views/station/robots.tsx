@@ -5,6 +5,7 @@ import type { Enrolment } from '../../api';
 import { count } from '../../format';
 import { natural_order } from '../../fleet';
 import { GuardedButton } from '../../parts/hold_button';
+import type { Robot } from '../../robot';
 import { format } from '../../route';
 import { useActs, useAsked } from '../experiments/acts';
 import { Enrolled } from './enrolled';
@@ -185,14 +186,20 @@ interface RowProps {
   on_enrol(robot_id: string): void;
 }
 
+// SAFETY: that a robot is connected is only said while the page hears it.
+export function link_word(known: Robot | undefined, is_current: boolean): string {
+  if (!known) return 'never seen';
+  if (known.is_away.value) return 'away';
+  return is_current ? 'connected' : 'was connected';
+}
+
 function Row({ robot, context, is_off, act, on_enrol }: RowProps) {
   const { session, is_utc, is_current } = context;
   const { robot_id, revoked_at_us, retired_at_us } = robot;
   const is_revoked = revoked_at_us !== null;
   const is_retired = (retired_at_us ?? null) !== null;
   const known = session.store.find(robot_id);
-  // SAFETY: that a robot is connected is only said while the page hears it.
-  const link = !known ? 'never seen' : known.is_away.value ? 'away' : is_current ? 'connected' : 'was connected';
+  const link = link_word(known, is_current);
   return (
     <tr data-robot={robot_id} class={is_revoked || is_retired ? 'off' : ''}>
       <th scope="row">{known ? <a href={format({ view: 'robot', parts: [robot_id] })}>{robot_id}</a> : robot_id}</th>
