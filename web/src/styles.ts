@@ -1,7 +1,6 @@
 // The style sheets and fonts of the page, in the order in which they build on each other.
 
-import '@fontsource/b612/latin-400.css';
-import '@fontsource/b612/latin-700.css';
+import './style/fonts.css';
 import 'uplot/dist/uPlot.min.css';
 import './style/ground.css';
 import './style/shell.css';
