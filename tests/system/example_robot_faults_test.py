@@ -114,10 +114,11 @@ class MeasuredTest(Bench):
 class ErrorTest(Bench):
     """Errors of the network end the link; errors of the robot end the program."""
 
-    def served(self, frame):
-        """What comes of a robot whose station sends this frame and hangs."""
+    def served(self, sent, *beside):
+        """What comes of a robot whose station sends these bytes and closes."""
         async def station(reader, writer):
-            writer.write(bytes([frame.ByteSize()]) + frame.SerializeToString())
+            writer.write(sent)
+            writer.write_eof()
             try:
                 await reader.read()
             finally:
@@ -125,21 +126,51 @@ class ErrorTest(Bench):
 
         async def serve():
             server = await asyncio.start_server(station, "127.0.0.1", 0)
-            async with server, asyncio.timeout(60):
-                await StationLink(self.robot, *server.sockets[0].getsockname()).connect_and_serve()
+            self.link = StationLink(self.robot, *server.sockets[0].getsockname())
+            self.link.say = self.said.append
+            async with server, asyncio.timeout(60), asyncio.TaskGroup() as tasks:
+                others = [tasks.create_task(other()) for other in (*beside, self.link.stay_connected)]
+                while len(self.said) < 2:
+                    await asyncio.sleep(0.01)
+                for other in others:
+                    other.cancel()
+        self.said = []
         asyncio.run(serve())
 
+    def frame(self, **body):
+        payload = pb.StationFrame(**body).SerializeToString()
+        return bytes([len(payload)]) + payload
+
     def test_an_error_of_the_motor_ends_the_program_and_not_the_link(self):
-        for error in (OSError("the driver is gone"), ValueError("no such duty"), EOFError()):
+        for error in (ConnectionError("the driver is gone"), ValueError("no such duty"), EOFError()):
             self.robot.stop = mock.Mock(side_effect=error)
-            with self.assertRaises(type(error)):
-                self.served(pb.StationFrame(command=self.stop()))
+            with self.assertRaises(ExceptionGroup) as ended:
+                self.served(self.frame(command=self.stop()))
+            self.assertEqual((ended.exception.exceptions, self.said), ((error,), []))
+
+    def test_a_bad_frame_ends_the_link_and_is_counted(self):
+        self.served(b"\x01\xff")
+        self.assertIn("cannot be decoded", self.said[0])
+        self.assertEqual(self.robot.bad_frames, 2)
+        self.served(self.frame(welcome=pb.Welcome(refusal=2, detail="no such robot")))
+        self.assertIn("refused: no such robot", self.said[0])
+        self.served(b"")
+        self.assertIn("the station closed the connection", self.said[0])
+        self.assertEqual(self.robot.bad_frames, 2)
+
+    def test_frames_that_come_together_do_not_delay_the_tick(self):
+        order = []
+
+        async def tick():
+            while True:
+                order.append("tick")
+                await asyncio.sleep(0)
+        self.robot.on_command = lambda *_: order.append("frame")
+        self.served(self.frame(command=self.stop()) * 50, tick)
+        self.assertGreaterEqual(order.count("frame"), 100)
+        self.assertNotIn("frame frame", " ".join(order))
 
     def test_errors_of_the_network_end_the_link(self):
-        with self.assertRaisesRegex(BadFrame, "decoded"):
-            self.served(mock.Mock(ByteSize=lambda: 1, SerializeToString=lambda: b"\xff"))
-        with self.assertRaisesRegex(LinkEnded, "refused: no such robot"):
-            self.served(pb.StationFrame(welcome=pb.Welcome(refusal=2, detail="no such robot")))
         for error, why in ((ssl.SSLCertVerificationError("bad"), "bad"), (EOFError(), "the station closed the connection")):
             async def fail():
                 raise error

@@ -113,6 +113,15 @@ class TimedTest(Orders):
         self.now_us += 500_000
         self.assertEqual(self.answer(self.renew()), "nothing_to_renew")
 
+    def test_its_renewal_does_not_revive_a_duty_that_has_lapsed_between_two_ticks(self):
+        self.answer(self.duty(0.3))
+        self.now_us += 300_000
+        self.store(after_us=600_000)
+        self.now_us += 250_000
+        self.assertEqual(self.answer(self.renew()), "accepted")
+        self.run_for(10_000)
+        self.assertEqual(self.robot.cart.duty, 0.0)
+
     def test_what_drops_it_and_how(self):
         drop, manual = self.command(drop_timed=pb.DropTimed()), pb.SetMode(mode=pb.MODE_MANUAL)
         for word, end in (("expired", drop), ("expired", self.duty(0.0)), ("wrong_mode", self.command(set_mode=manual)),
