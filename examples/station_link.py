@@ -89,6 +89,8 @@ class Connection:
         self.robot, self.reader, self.writer = robot, reader, writer
         self.is_welcome, self.sent_us, self.status_us = False, 0, 0
         self.probe_answers, self.clock_answers = collections.deque(maxlen=4), collections.deque(maxlen=4)
+        self.answers = (("command_ack", robot.stop_acks), ("stop_probe_answer", self.probe_answers),
+                        ("command_ack", robot.acks), ("heartbeat", self.clock_answers))  # the most urgent first
         self.send(hello=robot.hello())
 
     async def receive(self):
@@ -173,18 +175,12 @@ class Connection:
 
     def next_body(self):
         """What to send next, in the order of docs/protocol.md: a body of RobotFrame, or None."""
-        if self.robot.stop_acks:
-            return {"command_ack": self.robot.stop_acks.popleft()}
-        if not self.is_welcome:
-            return None  # until then only a stop is acknowledged
-        return self.next_answer() or self.next_event() or self.next_live() or self.next_status() or self.next_backfill()
-
-    def next_answer(self):
-        for body, waiting in (("stop_probe_answer", self.probe_answers), ("command_ack", self.robot.acks),
-                              ("heartbeat", self.clock_answers)):
+        for body, waiting in self.answers if self.is_welcome else self.answers[:1]:  # until then only a stop is acknowledged
             if waiting:
                 return {body: waiting.popleft()}
-        return None
+        if not self.is_welcome:
+            return None
+        return self.next_event() or self.next_live() or self.next_status() or self.next_backfill()
 
     def next_event(self):
         events = self.robot.events
