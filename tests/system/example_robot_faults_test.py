@@ -114,11 +114,12 @@ class MeasuredTest(Bench):
 class ErrorTest(Bench):
     """Errors of the network end the link; errors of the robot end the program."""
 
-    def served(self, sent, *beside):
-        """What comes of a robot whose station sends these bytes and closes."""
+    def served(self, sent, *beside, hangs=False):
+        """What comes of a robot whose station sends these bytes, and closes or hangs."""
         async def station(reader, writer):
             writer.write(sent)
-            writer.write_eof()
+            if not hangs:
+                writer.write_eof()
             try:
                 await reader.read()
             finally:
@@ -157,6 +158,18 @@ class ErrorTest(Bench):
         self.served(b"")
         self.assertIn("the station closed the connection", self.said[0])
         self.assertEqual(self.robot.bad_frames, 2)
+
+    def test_a_station_that_falls_silent_is_left(self):
+        async def tick():
+            while True:
+                self.now_us += 10_000
+                self.robot.step(self.now_us)
+                if self.link.connection:
+                    self.link.connection.on_tick()
+                await asyncio.sleep(0)
+        self.served(self.frame(welcome=pb.Welcome(protocol_version=1, link_timeout_ms=500)), tick, hangs=True)
+        self.assertIn("connected to", self.said[0])
+        self.assertIn("no frame within the link time-out", self.said[1])
 
     def test_frames_that_come_together_do_not_delay_the_tick(self):
         order = []
