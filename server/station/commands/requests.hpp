@@ -25,6 +25,7 @@ struct CommandRequest {
   std::string actor;
   std::string peer;                      // the address that it came from
   microseconds time_to_live{2'000'000};  // at most 10 s, from when it was issued
+  microseconds answer_grace{50'000};     // the robot's answer may come so long after it; then it is unknown
   microseconds age{0};                   // it was issued so long before it arrived
   std::string life_from = "arrival";     // how that is known, see CommandRecord
   microseconds unread{0};                // the station stood still: it may have waited for so long before it was read
