@@ -20,7 +20,6 @@ namespace {
 
 constexpr microseconds kTurn = 20ms;           // between two looks, if no sample comes
 constexpr microseconds kBeginsAfter = 500ms;   // more than kLookAhead
-constexpr microseconds kAnswerGrace = 1s;      // a late answer is no reason to abort: the command waits on the robot
 constexpr microseconds kWrongModeFor = 400ms;  // telemetry comes later than the time of a command
 constexpr microseconds kRenewsEvery = 120ms;   // a lease lasts 500 ms
 
@@ -199,6 +198,7 @@ station::CommandRequest RunDriver::request_of(const protocol::Command& command) 
   request.action = command;
   request.actor = request_.actor;
   request.peer = request_.peer;
+  request.answer_grace = station::kOwnAnswerGrace;
   request.takes_control = false;  // SAFETY: a program is no sign of life of its operator
   return request;
 }
@@ -210,7 +210,6 @@ asio::awaitable<void> RunDriver::send(FedCommand fed, std::uint64_t robot_now_us
   request.arguments = arguments_of(fed.command);
   const std::uint64_t at_us = fed.command.execute_at_robot_us;
   request.time_to_live = microseconds{at_us - std::min(at_us, robot_now_us) + kGraceUs};
-  request.answer_grace = kAnswerGrace;
   const auto sent = co_await parts_.station.submit(std::move(request));
   if (generation != generation_) co_return;
   if (sent && was_accepted(sent->state)) {

@@ -14,6 +14,8 @@ namespace server::station {
 
 inline constexpr microseconds kControlLease{3'000'000};      // after the holder's last sign of life
 inline constexpr microseconds kLongestControl{600'000'000};  // that a script may ask for
+// What the station asks by itself may be answered so long after its life: a late answer is no reason to give up.
+inline constexpr microseconds kOwnAnswerGrace{1'000'000};
 inline constexpr microseconds kOldestSight{400'000};         // of what a page has seen, to take or keep anything
 inline bool is_fresh(microseconds age) { return age >= microseconds{0} && age <= kOldestSight; }
 

@@ -19,7 +19,8 @@ void enqueue_everything(BootRegistry& boots, CommitQueue& queue);
 
 // What was received of a boot and is not durable yet, wherever it waits, in the form in which the database will give it
 // back. Samples of the range, ascending, cut to it: of the first segments that have `limit` samples together. When the
-// last sample of a segment has arrived is not said while others may follow it: what was read once stays the same.
+// last sample of a segment has arrived is not said while others may follow it, so that a time which was read once stays
+// the same; clock_uncertainty_us may grow until then.
 std::vector<Segment> waiting_samples(const CommitQueue& queue, const BootEntry& boot, Interval range,
                                      std::size_t limit);
 
