@@ -16,7 +16,7 @@ inline constexpr microseconds kControlLease{3'000'000};      // after the holder
 inline constexpr microseconds kLongestControl{600'000'000};  // that a script may ask for
 // What the station asks by itself may be answered so long after its life: a late answer is no reason to give up.
 inline constexpr microseconds kOwnAnswerGrace{1'000'000};
-inline constexpr microseconds kOldestSight{400'000};         // of what a page has seen, to take or keep anything
+inline constexpr microseconds kOldestSight{400'000};  // of what a page has seen, to take or keep anything
 inline bool is_fresh(microseconds age) { return age >= microseconds{0} && age <= kOldestSight; }
 
 // A request to command a robot. `action` has its action member set; the station fills id, boot and validity.
