@@ -289,10 +289,10 @@ class Robot:
         check(self.mode in modes, "wrong_mode")
 
     def do_set_mode(self, wanted, command_id, now_us):
+        self.check_mode(pb.MODE_MANUAL, pb.MODE_AUTO)
         is_auto = wanted.mode == pb.MODE_AUTO
         check(is_auto or wanted.mode == pb.MODE_MANUAL, "malformed")
         check(wanted.HasField("setpoint_m") == is_auto, "malformed")
-        self.check_mode(pb.MODE_MANUAL, pb.MODE_AUTO)
         if is_auto:
             self.check_setpoint(wanted.setpoint_m)
         self.rest(wanted.mode, "command", command_id)
@@ -374,7 +374,7 @@ def main():
     parser = argparse.ArgumentParser(description="A simulated cart on a track, for a Rheonaut station.")
     parser.add_argument("--station", type=address, default="127.0.0.1:7070", metavar="HOST:PORT")
     parser.add_argument("--id", default="cart-1", help="1 to 31 characters of [a-z0-9_-]")
-    parser.add_argument("--token-file", type=argparse.FileType(), help="with the token that `rheonaut robot enroll` prints")
+    parser.add_argument("--token-file", type=argparse.FileType(), help="with the token that `rheonaut robot enrol` prints")
     parser.add_argument("--tls-ca", type=authority, help="TLS, with a station whose certificate this authority has signed")
     options = parser.parse_args()
     if options.token_file and not options.tls_ca and options.station[0] not in ("127.0.0.1", "::1", "localhost"):

@@ -4,8 +4,8 @@
 
 A path in backquotes that begins with one of our folders must be a file or folder, with or without its suffix; `*` and
 `<noun>` match anything. A block of code that names a file, as "```cpp tests/sim_robot/story_examples_test.cpp", must
-stand in that file word for word. The station's own kinds of events are those of the table in docs/database.md,
-and the figures of the sizing table those of docs/performance.md.
+stand in that file word for word. The station's own kinds of events are those of the table in docs/database.md, the reasons
+for which it ends a robot's connection those of docs/protocol.md, and the figures of the sizing table those of docs/performance.md.
 Every decision has a number of its own and a row in docs/decisions/README.md, which also names the numbers that were never
 given. Prints `file:line: what is missing` and fails if anything is.
 """
@@ -83,6 +83,29 @@ def event_kinds(root):
     yield from (f"docs/database.md: the station makes no event {kind}" for kind in sorted(listed - made))
 
 
+def reasons_to_close(root):
+    """What is wrong with the table of the reasons for which the station ends a robot's connection."""
+    session, document = root / "server/link/robot_session.cpp", root / "docs/protocol.md"
+    if not session.is_file():
+        return
+    text = session.read_text(encoding="utf-8")
+    given = set(re.findall(r'\b(?:close_)?reason_? = [^;"]*?"([^"]+)"(?= *[;:])', text))
+    given |= set(re.findall(r'close_reason_ = [^;]*? : "([^"]+)";', text))
+    given |= set(re.findall(r'co_return "([^"]+)";', text)) | set(re.findall(r'^constexpr auto k\w+ = "([^"]+)";', text, re.M))
+    for source in (root / "server").rglob("*.cpp"):
+        if "/cli/" in source.as_posix():
+            continue
+        other = source.read_text(encoding="utf-8")
+        given |= set(re.findall(r'(?:session\.|->)close\((?:fmt::format\()?"([^"]+)"', other))
+        given |= set(re.findall(r'end_connection\([^;"]*"([^"]+)"\)', other))
+    given = {reason.replace("{}", "…") for reason in given - {": "}} | {"refusal: detail"}
+    given.discard("a hello that does not decode")  # it is refused: "malformed: …"
+    section = re.search(r"^### Why a connection ends$(.*?)^The robot ends it", document.read_text(encoding="utf-8"), re.M | re.S)
+    listed = set(re.findall(r"^\| `([^|]+)` \|", section.group(1), re.M)) if section else set()
+    yield from (f"docs/protocol.md: no row for the end of a connection “{reason}”" for reason in sorted(given - listed))
+    yield from (f"docs/protocol.md: no connection ends by “{reason}”" for reason in sorted(listed - given))
+
+
 def sizing(root):
     """Figures of the sizing table that docs/performance.md does not have as measured."""
     document, measured = root / "docs/operations.md", root / "docs/performance.md"
@@ -117,6 +140,7 @@ def decision_numbers(root):
 
 def faults(root):
     yield from event_kinds(root)
+    yield from reasons_to_close(root)
     yield from decision_numbers(root)
     yield from sizing(root)
     documents = [*root.glob("*.md"), *root.glob("docs/**/*.md")]

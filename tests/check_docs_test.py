@@ -47,6 +47,25 @@ class CheckDocs(unittest.TestCase):
             self.assertEqual(list(faults(root)), ["docs/database.md: no row for the event connected of the station",
                                                   "docs/database.md: the station makes no event gone"])
 
+    def test_the_reasons_to_end_a_connection_have_rows(self):
+        rows = "### Why a connection ends\n\n| `late` | when |\n| `refusal: detail` | refused |\n| `taken over by …` | when |\n| `gone` | when |\n\nThe robot ends it\n"
+        code = {"server/link/robot_session.cpp": 'constexpr auto kFault = "a fault";\n'
+                                                 '  if (!has_come) close_reason_ = "late";\n'
+                                                 '  close_reason_ = is_odd ? kOdd : "odd";\n'
+                                                 '  co_return "silent";\n'
+                                                 '  close_reason_ = text(refusal) + ": " + detail;\n',
+                "server/station/a.cpp": 'previous->close(fmt::format("taken over by {}", peer));\n',
+                "server/api/a.cpp": 'parts.station.end_connection(*id, "revoked");\n'}
+        with tempfile.TemporaryDirectory() as folder:
+            root = pathlib.Path(folder)
+            for path, text in {"docs/protocol.md": rows, **code}.items():
+                (root / path).parent.mkdir(parents=True, exist_ok=True)
+                (root / path).write_text(text)
+            found = [fault for fault in faults(root) if "end" in fault]
+        self.assertEqual(found, [f"docs/protocol.md: no row for the end of a connection “{reason}”"
+                                 for reason in ("a fault", "odd", "revoked", "silent")]
+                         + ["docs/protocol.md: no connection ends by “gone”"])
+
     def test_the_sizing_table_has_measured_figures(self):
         with tempfile.TemporaryDirectory() as folder:
             docs = pathlib.Path(folder) / "docs"

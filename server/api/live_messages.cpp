@@ -153,8 +153,18 @@ Result<void> on_page_message(const std::string& text, const identity::Caller& ca
   return fail(ErrorCode::invalid, fmt::format("unknown message type '{}'", *type), "unknown_type");
 }
 
-std::string problem_message(const Error& error) {
-  const json body = http::problem_json(http::http_status(error.code), error.detail, error.reason);
+// SAFETY: a stop needs no more than to see the robot; of a type that is not known here, command is needed.
+identity::Scope scope_needed_by(const std::string& text) {
+  const auto message = Members::parse(text, {});
+  const auto type = message ? message->text("type", {0, kMaxMessageBytes}) : std::unexpected{message.error()};
+  if (!type) return identity::Scope::read;  // refused for that
+  if (*type == "emergency_stop") return identity::Scope::stop;
+  const bool is_reading = *type == "keep_alive" || *type == "watch" || *type == "echo";
+  return is_reading ? identity::Scope::read : identity::Scope::command;
+}
+
+std::string problem_message(const Error& error, identity::Scope needed) {
+  const json body = http::problem_json(error, least_role(needed));
   return base::dump({{"type", "problem"}, {"problem", body}});
 }
 

@@ -29,6 +29,7 @@ struct LiveParts {
   runtime::Turns turns{loop, 3};  // of the pages that something is written to: some 70 µs of work
 };
 
+inline constexpr std::size_t kMaxMessageBytes = 4096;
 inline constexpr std::size_t kMaxRenewals = 256;
 inline constexpr std::size_t kMaxWatched = 64;  // robots, of a page
 
@@ -40,6 +41,10 @@ live::RobotDocument welcome_message(const std::string& actor, const LiveParts& p
 Result<void> on_page_message(const std::string& text, const identity::Caller& caller, live::Subscriber& page,
                              LiveParts& parts);
 
-std::string problem_message(const Error& error);
+// What its sender needs: of a type that is not known, command; of a text that is no message, read.
+identity::Scope scope_needed_by(const std::string& text);
+
+// `needed`: of the message that was refused.
+std::string problem_message(const Error& error, identity::Scope needed);
 
 }  // namespace server::api

@@ -24,8 +24,6 @@ using namespace asio::experimental::awaitable_operators;  // NOLINT: operators o
 
 namespace {
 
-constexpr std::size_t kMaxMessageBytes = 4096;
-
 class LivePage {
  public:
   LivePage(http::HttpStream stream, identity::Caller caller, LiveParts& parts)
@@ -71,7 +69,7 @@ class LivePage {
   // The boundary: a message that cannot be acted on ends neither the page nor the station.
   Result<void> act_on(const std::string& text) {
     try {
-      if (auto permitted = check_permission(text); !permitted) return permitted;
+      if (auto permitted = check_permission(scope_needed_by(text)); !permitted) return permitted;
       return on_page_message(text, caller_, queue_, parts_);
     } catch (...) {
       parts_.tasks.exceptions().note(runtime::Ended::request, "a message of " + caller_.actor + " on /live",
@@ -80,19 +78,11 @@ class LivePage {
     }
   }
 
-  // SAFETY: a stop needs no more than to see the robot; of a type that is not known here, command is needed.
-  Result<void> check_permission(const std::string& text) const {
-    const auto message = Members::parse(text, {});
-    const auto type = message ? message->text("type", {0, kMaxMessageBytes}) : std::unexpected{message.error()};
-    if (!type) return {};  // refused for that
-    const bool is_reading = *type == "keep_alive" || *type == "watch" || *type == "echo";
-    const identity::Scope needed = *type == "emergency_stop" ? identity::Scope::stop
-                                   : is_reading              ? identity::Scope::read
-                                                             : identity::Scope::command;
+  Result<void> check_permission(identity::Scope needed) const {
     if (caller_.scopes.allow(needed)) return {};
     return fail(ErrorCode::forbidden,
-                fmt::format("{} needs the role {}; {} has the role {}", type->substr(0, 40),
-                            identity::text(least_role(needed)), caller_.actor, identity::text(caller_.role())),
+                fmt::format("this message needs the role {}; {} has the role {}", identity::text(least_role(needed)),
+                            caller_.actor, identity::text(caller_.role())),
                 "not_permitted");
   }
 
@@ -109,12 +99,14 @@ class LivePage {
       peer_.on_received();
       // Each of its messages may become a task.
       if (peer_.is_too_talkative()) co_await parts_.clock.sleep_until(peer_.resume_at_us());
-      const auto understood = act_on(beast::buffers_to_string(buffer.data()));
+      const std::string text = beast::buffers_to_string(buffer.data());
+      const auto understood = act_on(text);
       buffer.clear();
       if (!understood) {
         parts_.station.note_refusal({caller_.actor, caller_.peer, parts_.clock.utc_us()}, "", "command", "{}",
                                     understood.error());
-        queue_.push(std::make_shared<const std::string>(problem_message(understood.error())), true);
+        queue_.push(std::make_shared<const std::string>(problem_message(understood.error(), scope_needed_by(text))),
+                    true);
       }
     }
   }

@@ -133,7 +133,7 @@ void define_command_line(CLI::App& app, CommandLine& line) {
   offer<LoginLink>(app, "login-link", "Make a one-time link that signs a browser in", line);
   offer<UserCommand>(app, "user", "Users of a station: add, list, change, remove", line);
   offer<TokenCommand>(app, "token", "API tokens of a station: create, list, revoke", line);
-  offer<RobotCommand>(app, "robot", "Robots of a station: enroll, list, revoke", line);
+  offer<RobotCommand>(app, "robot", "Robots of a station: enrol, list, revoke", line);
   offer<Commission>(*app.get_subcommand("robot"), "commission",
                     "The first hour with a robot: prove its stops, measure it, write a signed record", line);
   offer<FluidCommand>(app, "fluid", "Fluids of a station and their models: list, model, remove-model", line);

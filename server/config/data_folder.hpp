@@ -4,7 +4,8 @@
 //   station.head.json                the database's state some seconds ago (storage/upkeep/store_head)
 //   rheonaut.token, .sessions        written by the API
 //   endpoints.json                   {"http":"127.0.0.1:8080","robots":"127.0.0.1:7070","pid":123}, while it runs; and
-//                                    "tls_certificate", the file to trust, when http is https
+//                                    "tls_certificate", the file to trust, when http is https, and
+//                                    "robots_tls_certificate" when robots dial with TLS
 //   tls/                             made by `rheonaut certificate`
 //   rheonaut.lock                    locked while it runs
 //   rheonaut.reserve                 1 MB of room for a start on a full disk

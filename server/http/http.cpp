@@ -73,16 +73,52 @@ Response html_response(int status, std::string body) {
   return response;
 }
 
-json problem_json(int status, std::string detail, std::string reason) {
-  return {{"type", "about:blank"},
-          {"title", reason_phrase(status)},
-          {"status", status},
-          {"detail", std::move(detail)},
-          {"reason", std::move(reason)}};
+namespace {
+
+// The reason of an error that has none of its own.
+const char* reason_of(ErrorCode code) {
+  switch (code) {
+    case ErrorCode::bad_request: return "bad_request";
+    case ErrorCode::unauthorized: return "unauthorized";
+    case ErrorCode::forbidden: return "forbidden";
+    case ErrorCode::not_found: return "not_found";
+    case ErrorCode::conflict: return "conflict";
+    case ErrorCode::rejected: return "rejected";
+    case ErrorCode::not_connected: return "not_connected";
+    case ErrorCode::invalid: return "invalid";
+    case ErrorCode::internal: return "internal";
+    case ErrorCode::unavailable: return "unavailable";
+    case ErrorCode::timed_out: return "timed_out";
+  }
+  return "internal";
+}
+
+std::string reason_of(const Error& error) { return error.reason.empty() ? reason_of(error.code) : error.reason; }
+
+json details(int status, std::string detail, std::string reason) {
+  json body{{"type", "about:blank"},
+            {"title", reason_phrase(status)},
+            {"status", status},
+            {"detail", std::move(detail)},
+            {"reason", std::move(reason)}};
+  if (status == 403) body["needs"] = nullptr;
+  return body;
+}
+
+json role_for(const Error& error, identity::Role role) {
+  return error.code == ErrorCode::forbidden ? json{{"needs", identity::text(role)}} : json::object();
+}
+
+}  // namespace
+
+json problem_json(const Error& error, identity::Role needs_if_forbidden) {
+  json body = details(http_status(error.code), error.detail, reason_of(error));
+  body.update(role_for(error, needs_if_forbidden));
+  return body;
 }
 
 Response problem(int status, std::string detail, std::string reason, json extra) {
-  json body = problem_json(status, std::move(detail), std::move(reason));
+  json body = details(status, std::move(detail), std::move(reason));
   body.update(extra);
   Response response = json_response(status, body);
   response.content_type = "application/problem+json";
@@ -90,7 +126,11 @@ Response problem(int status, std::string detail, std::string reason, json extra)
 }
 
 Response problem(const Error& error, json extra) {
-  return problem(http_status(error.code), error.detail, error.reason, std::move(extra));
+  return problem(http_status(error.code), error.detail, reason_of(error), std::move(extra));
+}
+
+Response problem(const Error& error, identity::Role needs_if_forbidden) {
+  return problem(error, role_for(error, needs_if_forbidden));
 }
 
 }  // namespace server::http

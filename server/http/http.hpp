@@ -62,9 +62,11 @@ Response json_response(int status, const nlohmann::json& body);
 Response json_text_response(int status, std::string text);  // text that is JSON already
 Response html_response(int status, std::string body);
 
-// Problem details (RFC 9457). `extra` adds members.
+// Problem details (RFC 9457). `extra` adds members. An error without a reason has that of its code. A 403 has `needs`,
+// the least role that may do this; null: no role changes it.
 Response problem(int status, std::string detail, std::string reason, nlohmann::json extra = nlohmann::json::object());
 Response problem(const Error& error, nlohmann::json extra = nlohmann::json::object());
-nlohmann::json problem_json(int status, std::string detail, std::string reason);
+Response problem(const Error& error, identity::Role needs_if_forbidden);
+nlohmann::json problem_json(const Error& error, identity::Role needs_if_forbidden);
 
 }  // namespace server::http

@@ -33,8 +33,13 @@ bool changes_something(const Request& request) {
 }
 
 std::unexpected<Response> refuse(int status, const char* detail, const char* reason) {
-  Response response = problem(status, detail, reason);
-  if (status == 401) response.headers.emplace_back("WWW-Authenticate", "Bearer");
+  return std::unexpected<Response>{problem(status, detail, reason)};
+}
+
+// `challenge`: as RFC 6750 has it.
+std::unexpected<Response> not_authenticated(const char* detail, const char* reason, const char* challenge) {
+  Response response = problem(401, detail, reason);
+  response.headers.emplace_back("WWW-Authenticate", challenge);
   return std::unexpected<Response>{std::move(response)};
 }
 
@@ -80,17 +85,24 @@ bool RequestGuard::host_is_ours(const std::string& host) const {
   return !error && address.is_loopback();
 }
 
-std::optional<RequestGuard::Credential> RequestGuard::credential_of(const Request& request) const {
+std::expected<RequestGuard::Credential, Response> RequestGuard::credential_of(const Request& request) const {
   const std::string authorization = request.header("authorization");
   if (!authorization.empty()) {  // a wrong token is not made good by a cookie
     constexpr std::size_t kSchemeLength = 7;
-    if (lower(authorization.substr(0, kSchemeLength)) != "bearer ") return std::nullopt;
+    if (lower(authorization.substr(0, kSchemeLength)) != "bearer ") {
+      return not_authenticated("the header Authorization has another scheme than Bearer; send 'Bearer <token>'",
+                               "no_credential", "Bearer");
+    }
     auto caller = auth_.caller_of_token(authorization.substr(kSchemeLength));
-    return caller ? std::optional{Credential{std::move(*caller), false}} : std::nullopt;
+    if (caller) return Credential{std::move(*caller), false};
+    return not_authenticated("the token is none of this station, was revoked or has expired; make another one",
+                             "wrong_token", R"(Bearer error="invalid_token")");
   }
   const std::string cookies = request.header("cookie");
   auto caller = auth_.caller_of_session(cookie_value(cookies, auth_.cookie_name()));
-  return caller ? std::optional{Credential{std::move(*caller), true}} : std::nullopt;
+  if (caller) return Credential{std::move(*caller), true};
+  return not_authenticated("sign in, open the link that the station printed, or send a token as Bearer",
+                           "no_credential", "Bearer");
 }
 
 std::expected<identity::Caller, Response> RequestGuard::admit(const Request& request) const {
@@ -115,9 +127,7 @@ std::expected<identity::Caller, Response> RequestGuard::admit(const Request& req
   }
 
   auto credential = credential_of(request);
-  if (!credential) {
-    return refuse(401, "sign in, open the link that the station printed, or send a token as Bearer", "no_credential");
-  }
+  if (!credential) return std::unexpected<Response>{std::move(credential.error())};
   if (credential->by_cookie && changes_something(request) && !same_origin &&
       (!origin.empty() || request.header("sec-fetch-site") != "same-origin")) {
     return refuse(403, "a request by cookie must say that it comes from the station's own page (Origin)",

@@ -2,10 +2,10 @@
 //
 // In this order: the Host header names this station (421; keeps out pages that point their own name at this machine);
 // a request that changes something, and /live, comes from the station's own page if from a page at all (403);
-// everything but signing in and the files of the cockpit, which hold no data, has a credential (401); a request that
-// changes something and rests on the cookie says where it comes from (403); a body is JSON (415). What the caller may
-// do is the routes' to say (Router), and of /live it is decided here: its caller may see everything (403). /foxglove is
-// let in by its own ticket alone (api/foxglove_routes.hpp), whatever its origin.
+// everything but signing in and the files of the cockpit, which hold no data, has a credential (401; a wrong token has
+// a reason of its own); a request that changes something and rests on the cookie says where it comes from (403); a body
+// is JSON (415). What the caller may do is the routes' to say (Router), and of /live it is decided here: its caller may
+// see everything (403). /foxglove is let in by its own ticket alone (api/foxglove_routes.hpp), whatever its origin.
 // SAFETY: of an emergency stop the body is not given to be judged (HttpConnection), so that a form of another page is
 // kept out by the origin alone.
 #pragma once
@@ -35,7 +35,7 @@ class RequestGuard {
   };
 
   bool host_is_ours(const std::string& host) const;
-  std::optional<Credential> credential_of(const Request& request) const;
+  std::expected<Credential, Response> credential_of(const Request& request) const;
 
   identity::Auth& auth_;
   std::vector<std::string> hosts_;

@@ -63,7 +63,8 @@ bool Router::is_stop(const std::string& method, const Target& target) const {
   });
 }
 
-const Route* Router::find(const std::string& method, const Target& target) const {
+const Route* Router::find(const std::string& of_request, const Target& target) const {
+  const std::string method = of_request == "HEAD" ? "GET" : of_request;
   for (const Entry& entry : entries_) {
     const Route& route = routes_[entry.route];
     if (route.method == method && matches(entry, target)) return &route;

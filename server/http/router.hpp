@@ -56,6 +56,8 @@ class Router {
   Answer dispatch(Request request) const;
 
   const std::vector<Route>& routes() const { return routes_; }
+  // Null: there is none. HEAD has the route of GET.
+  const Route* find(const std::string& method, const Target& target) const;
 
  private:
   struct Entry {
@@ -64,7 +66,6 @@ class Router {
   };
 
   bool matches(const Entry& entry, const Target& target) const;
-  const Route* find(const std::string& method, const Target& target) const;
 
   std::vector<Route> routes_;
   std::vector<Entry> entries_;

@@ -1,6 +1,8 @@
 // Checks a Hello and fills a Welcome.
 #include "server/link/greeting.hpp"
 
+#include <pb_decode.h>
+
 #include <algorithm>
 #include <cstring>
 
@@ -38,6 +40,23 @@ std::optional<Refusal> refusal_of(const protocol::Hello& hello, std::uint64_t ro
   }
   return Refusal{rheonaut_REFUSAL_REASON_MALFORMED,
                  "robot_id must be 1 to 31 of [a-z0-9_-], boot_id not 0, and oldest_seq ≤ next_seq"};
+}
+
+Refusal refusal_of_too_long_hello() {
+  return {rheonaut_REFUSAL_REASON_MALFORMED,
+          "the hello does not decode: robot_id has at most 31 bytes, token 71, firmware_version 23"};
+}
+
+bool has_hello(protocol::Bytes payload) {
+  pb_istream_t stream = pb_istream_from_buffer(payload.first, payload.size);
+  for (;;) {
+    pb_wire_type_t wire{};
+    std::uint32_t tag = 0;
+    bool is_at_end = false;
+    if (!pb_decode_tag(&stream, &wire, &tag, &is_at_end)) return false;
+    if (tag == rheonaut_RobotFrame_hello_tag) return wire == PB_WT_STRING;
+    if (!pb_skip_field(&stream, wire)) return false;
+  }
 }
 
 std::optional<Refusal> refusal_of(const station::Admission& admission) {

@@ -21,6 +21,10 @@ struct Refusal {
 // Of a Hello that says what cannot be, or speaks another version; nothing when it may be admitted: the archive does not
 // judge its numbers again.
 std::optional<Refusal> refusal_of(const protocol::Hello& hello, std::uint64_t robot_time_us);
+// Of a Hello that does not decode, since a text in it is longer than it may be.
+Refusal refusal_of_too_long_hello();
+// Whether the payload is a RobotFrame with a Hello in it, whatever that says.
+bool has_hello(protocol::Bytes payload);
 // Of a robot that the archive does not admit.
 std::optional<Refusal> refusal_of(const station::Admission& admission);
 

@@ -17,6 +17,7 @@ using namespace asio::experimental::awaitable_operators;  // NOLINT: operators o
 namespace {
 
 constexpr auto kClosedByRobot = "the robot closed the connection";
+constexpr auto kUndecodedHello = "a hello that does not decode";
 constexpr auto kFault = "a fault of the station; its log says which";
 constexpr std::int64_t kGridUs = 4'000;  // at whose multiples sessions wake, many at once
 
@@ -51,6 +52,10 @@ asio::awaitable<bool> RobotSession::greet() {
   if (failure_) std::rethrow_exception(failure_);
   if (!has_come) close_reason_ = "no hello within 5 s";
   if (close_reason_ == kClosedByRobot) close_reason_ = "closed before its hello";
+  if (close_reason_ == kUndecodedHello) {
+    const Refusal refusal = refusal_of_too_long_hello();
+    co_return co_await refuse(refusal);
+  }
   co_return close_reason_.empty() && co_await admit(*hello_);
 }
 
@@ -124,7 +129,7 @@ bool RobotSession::decode_next_of(protocol::Bytes& unread) {
                       0);  // SAFETY: the robot is there: what a stop's repetition and the ends of commands wait for
     station_.on_invalid_values(*this, 1, "malformed", "a frame does not decode");
   }
-  close_reason_ = "a frame that does not decode";
+  close_reason_ = !hello_ && has_hello(reader_.payload()) ? kUndecodedHello : "a frame that does not decode";
   return false;
 }
 

@@ -15,7 +15,6 @@ namespace asio = boost::asio;
 
 namespace {
 
-constexpr microseconds kAckGrace{1'000'000};   // an answer may come this much after the time to live
 constexpr microseconds kSeenGrace{5'000'000};  // what shows the effect may come so much after it
 
 // Whether a command need not be seen in telemetry since a later one has taken its place.
@@ -264,8 +263,8 @@ void CommandTracker::expire(RobotEntry& entry) {
   std::vector<CommandId> expired;
   for (const auto& [id, pending] : entry.commands.unanswered) {
     if (pending->is_stop()) continue;
-    const std::int64_t grace_us = pending->record.state == CommandState::queued ? 0 : kAckGrace.count();
-    if (now_us >= pending->deadline_us + grace_us) expired.push_back(id);
+    const bool is_queued = pending->record.state == CommandState::queued;
+    if (now_us >= (is_queued ? pending->deadline_us : pending->answer_due_us)) expired.push_back(id);
   }
   for (const CommandId id : expired) {
     end_unanswered(entry, id, "no_answer", CommandState::expired, "not_sent_in_time");

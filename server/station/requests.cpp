@@ -18,8 +18,7 @@ namespace asio = boost::asio;
 
 namespace {
 
-constexpr microseconds kPatience{2'000'000};  // for the answer, after the time to live
-constexpr microseconds kSeenPatience{6'000'000};
+constexpr microseconds kSeenPatience{6'000'000};  // for a command's end, after its answer
 constexpr microseconds kWatchInterval{200'000};
 
 Error unknown_robot(const RobotId& id) {
@@ -41,6 +40,17 @@ void publish_stops(SinkNotifier& notifier, const RobotTable& robots, const std::
   }
 }
 
+// The robot's answer or, right after the command's time to live, that there was none; with `until_verified` its end.
+asio::awaitable<Result<CommandRecord>> outcome_of(StationParts& parts, std::shared_ptr<PendingCommand> pending,
+                                                  bool until_verified) {
+  const microseconds patience{pending->answer_due_us - parts.clock.steady_us()};
+  co_await parts.tracker.follow(pending, false, patience);
+  // Frames of the robot end what is overdue; of one that is silent this does.
+  if (RobotEntry* entry = parts.robots.find(pending->record.robot_id)) parts.tracker.expire(*entry);
+  if (until_verified) co_await parts.tracker.follow(pending, true, kSeenPatience);
+  co_return pending->record;
+}
+
 std::string slot_text(const Reservation& slot) {
   const std::string purpose = slot.purpose.empty() ? "" : ": " + slot.purpose;
   return fmt::format("{} for {} from {} until {}{}", slot.id, slot.holder, utc_text(slot.from_us),
@@ -60,15 +70,14 @@ asio::awaitable<Result<CommandRecord>> Station::submit(CommandRequest request) {
   if (moves_the_motor(request.action)) request.age = std::max(request.age, request.unread);
   RobotEntry& entry = *known;
   CommandTracker& tracker = parts_->tracker;
-  const microseconds patience = request.time_to_live + (request.until_verified ? kSeenPatience : kPatience);
   if (!request.key.empty()) {
     const auto same = tracker.find_same(request, entry);
     if (!same) co_return parts_->refuse(request, same.error());
-    if (*same != nullptr) co_return co_await tracker.follow(*same, request.until_verified, patience);
+    if (*same != nullptr) co_return co_await outcome_of(*parts_, *same, request.until_verified);
   }
   const auto sent = dispatch(*parts_, entry, request);
   if (!sent) co_return parts_->refuse(request, sent.error());
-  co_return co_await tracker.follow(*sent, request.until_verified, patience);
+  co_return co_await outcome_of(*parts_, *sent, request.until_verified);
 }
 
 asio::awaitable<Result<CommandRecord>> Station::emergency_stop(StopRequest request, microseconds patience) {

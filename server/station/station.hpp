@@ -54,7 +54,7 @@ class Station {
   const RobotSettings* settings(const RobotId& id) const;
 
   // Checks the request, sends it and waits for the robot's answer (acknowledged, rejected, expired, superseded or
-  // failed), at most `time_to_live` and 2 s, or with `until_verified` for the command's end. The record becomes
+  // failed; right after its time to live unknown), or with `until_verified` for the command's end. The record becomes
   // verified by itself. An error means that nothing was sent.
   boost::asio::awaitable<Result<CommandRecord>> submit(CommandRequest request);
 

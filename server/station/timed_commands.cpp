@@ -59,6 +59,7 @@ bool TimedCommands::send_drop(RobotEntry& entry) {
   request.action.which_action = rheonaut_Command_drop_timed_tag;
   request.actor = "station:control";
   request.time_to_live = microseconds{protocol::kMaxTimeToLiveUs};
+  request.answer_grace = kOwnAnswerGrace;
   const auto drop = make_pending(loop_, clock_, request, entry.robot);
   if (!entry.link->send(drop->wire, drop->deadline_us)) return false;
   entry.timed.by.clear();

@@ -27,7 +27,7 @@ namespace asio = boost::asio;
 constexpr int kNeverIn = 2;  // exit status, as of a fleet
 
 // Beside a fleet's summary, which goes to standard output.
-void say(const std::string& line) { std::cerr << "rheonaut-sim: " << line << std::endl; }
+void say(const std::string& line) { std::cerr << "rheonaut-sim: " + line + '\n'; }
 
 void spawn(asio::io_context& loop, asio::awaitable<void> task) {
   asio::co_spawn(loop, std::move(task), [](const std::exception_ptr& error) {

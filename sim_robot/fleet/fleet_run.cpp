@@ -10,6 +10,7 @@
 #include <boost/asio/steady_timer.hpp>
 #include <boost/asio/use_awaitable.hpp>
 #include <csignal>
+#include <iostream>
 #include <ostream>
 #include <stdexcept>
 
@@ -44,20 +45,20 @@ void allow_sockets(int robots) {
   setrlimit(RLIMIT_NOFILE, &limit);
 }
 
-// Says what keeps robots out, each thing once.
+// Says what keeps robots out, each thing once; on standard error, since standard output has results only.
 class LinkNews {
  public:
-  LinkNews(const FleetOptions& options, std::ostream& out) : options_(options), out_(out) {}
+  explicit LinkNews(const FleetOptions& options) : options_(options) {}
 
   void tell(const FleetCounts& counts) {
     if (options_.json) return;  // the counts are in every line
     const bool is_away = counts.connected == 0 && counts.links.unreachable > before_.links.unreachable;
     if (is_away && !was_away_) {
-      out_ << "rheonaut-sim: cannot reach the station at " << options_.station.host << ':' << options_.station.port
-           << ", trying again" << std::endl;
+      std::cerr << "rheonaut-sim: cannot reach the station at " << options_.station.host << ':' << options_.station.port
+                << ", trying again" << std::endl;
     }
     if (counts.links.refusals > 0 && before_.links.refusals == 0) {
-      out_ << "rheonaut-sim: the station refuses robots: " << counts.refusal << std::endl;
+      std::cerr << "rheonaut-sim: the station refuses robots: " << counts.refusal << std::endl;
     }
     if (is_away || counts.connected > 0) was_away_ = is_away;
     before_ = counts;
@@ -65,7 +66,6 @@ class LinkNews {
 
  private:
   const FleetOptions& options_;
-  std::ostream& out_;
   FleetCounts before_;
   bool was_away_ = false;
 };
@@ -87,7 +87,7 @@ struct Watch {
 
 asio::awaitable<void> report_rates(const Watch& watch) {
   asio::steady_timer timer{co_await asio::this_coro::executor};
-  LinkNews news{watch.options, watch.out};
+  LinkNews news{watch.options};
   FleetSnapshot before;
   for (;;) {
     const auto seconds = std::chrono::duration_cast<std::chrono::seconds>(Clock::now() - watch.start);

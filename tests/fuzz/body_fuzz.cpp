@@ -96,7 +96,7 @@ class BodyStation : public ApiTest {
         "token:local", "", identity::Scopes::of(identity::Role::admin), 0, std::make_shared<identity::Standing>(loop),
         "127.0.0.1"};
     const auto understood = on_page_message(text, caller, page_, live_parts_);
-    if (!understood) require(json::accept(api::problem_message(understood.error())), text);
+    if (!understood) require(json::accept(api::problem_message(understood.error(), api::scope_needed_by(text))), text);
     clock.settle();
     ++changes_;
   }

@@ -86,7 +86,7 @@ std::string GoldenStation::problem_of(const std::string& message) {
       "user:ada", "", identity::Scopes::of(identity::Role::admin), 0, std::make_shared<identity::Standing>(loop),
       "127.0.0.1"};
   const auto understood = on_page_message(message, caller, all_, parts_);
-  return understood ? "" : api::problem_message(understood.error());
+  return understood ? "" : api::problem_message(understood.error(), api::scope_needed_by(message));
 }
 
 std::string GoldenStation::dropped_message() {

@@ -146,7 +146,7 @@ class AccountsTest(unittest.TestCase):
 
     def test_a_robot_is_enrolled_refused_and_revoked(self):
         with lab() as place:
-            status, out, err = cli(place, "robot", "enroll", "rheo-1")
+            status, out, err = cli(place, "robot", "enrol", "rheo-1")
             self.assertEqual((status, err), (0, ""))
             token = out.split("shown only now:\n\n  ")[1].split("\n")[0]
             self.assertIn(f'"{token}",', out)
@@ -170,7 +170,7 @@ class AccountsTest(unittest.TestCase):
             self.assertIn("revoked", cli(place, "robot", "list")[1])
             self.assertEqual(station.robot("rheo-1")["link"], "disconnected")
 
-            made = json.loads(cli(place, "robot", "enroll", "rheo-1", "--json")[1])
+            made = json.loads(cli(place, "robot", "enrol", "rheo-1", "--json")[1])
             self.assertNotEqual(made["secret"], token)
             place.processes[-1].terminate()
             place.processes[-1].wait()
@@ -179,7 +179,7 @@ class AccountsTest(unittest.TestCase):
 
     def test_a_robot_is_retired_with_and_without_a_station(self):
         with lab() as place:
-            self.assertEqual(cli(place, "robot", "enroll", "rheo-1")[0], 0)
+            self.assertEqual(cli(place, "robot", "enrol", "rheo-1")[0], 0)
             self.assertEqual(cli(place, "robot", "retire", "rheo-1")[1], "Robot rheo-1 was retired\n")
             station = place.start_station()
             self.assertTrue(station.robot("rheo-1")["retired"])
@@ -202,7 +202,7 @@ class AccountsTest(unittest.TestCase):
                 (("user", "add", "anna", "--role", "boss"), PASSWORD, "must be one of viewer, operator, admin"),
                 (("token", "create", "x", "--scopes", "root"), "", "scope 'root' is none of"),
                 (("token", "create", "local"), "", "the station's own token"),
-                (("robot", "enroll", "Rheo 1"), "", "must be 1 to 31 characters"),
+                (("robot", "enrol", "Rheo 1"), "", "must be 1 to 31 characters"),
             ]
             for arguments, text, expected in cases:
                 with self.subTest(arguments=arguments):

@@ -112,7 +112,7 @@ class AuditTest(unittest.TestCase):
 
     def tools(self, place):
         """Without a station: the tool's own user is the actor."""
-        self.assertEqual(place.tool("robot", "enroll", "rheo-9", "--data", place.data).returncode, 0)
+        self.assertEqual(place.tool("robot", "enrol", "rheo-9", "--data", place.data).returncode, 0)
         self.assertEqual(place.tool("robot", "revoke", "rheo-9", "--data", place.data).returncode, 0)
         with sqlite3.connect(f"file:{place.data / 'station.sqlite'}?mode=ro", uri=True) as connection:
             latest = connection.execute("SELECT actor, action, robot_id FROM audit ORDER BY entry DESC LIMIT 2").fetchall()

@@ -39,8 +39,8 @@ class FirstStepsTest(unittest.TestCase):
                     place.processes.append(subprocess.Popen([BIN / "rheonaut-sim", "--data", place.data, "--id", "found"],
                                                             stdout=out, stderr=errors, stdin=subprocess.DEVNULL))
                 station.wait_for_robot("found")
-                said = wait_until((place.folder / "errors").read_text, 60, "a message of the link")
-                self.assertIn("connected to 127.0.0.1:", said)
+                wait_until(lambda: "connected to 127.0.0.1:" in (place.folder / "errors").read_text(), 60,
+                           "a message of the link")
                 self.assertEqual((place.folder / "out").read_text(), "", "standard output is for results")
 
     def test_a_link_works_once_and_then_leads_to_a_page_that_says_what_to_do(self):
@@ -53,7 +53,7 @@ class FirstStepsTest(unittest.TestCase):
             self.assertEqual(opened(url)[0], 303)
             status, page = opened(url)
             self.assertEqual(status, 401)
-            self.assertRegex(page, r'<div id="cockpit">|rheonaut login-link', "the cockpit, or a plain page without it")
+            self.assertIn('<div id="cockpit">', page, "the cockpit, which says what to do")
 
     def test_a_port_that_is_taken_is_one_sentence_and_is_not_replaced(self):
         taken, address = taken_port()

@@ -13,7 +13,7 @@ DUTY = 0.25
 SCHEDULE = [{"tick": 0, "duty": DUTY}, {"tick": 3000, "duty": 0}]  # half a minute
 LEASE_US, TICK_US = 500_000, 10_000
 # Reasons on a machine so busy that the lease lapses, or that a request is old when it arrives.
-LAPSED = ("nothing_to_renew", "timed_out", "expired", "stale")
+LAPSED = ("nothing_to_renew", "no_answer", "timed_out", "expired", "stale")
 
 
 class PageOwner:

@@ -153,13 +153,12 @@ export class Api {
     const path = past(robot_id, 'commands', { ...within, limit: 1000, renewals: 'false' });
     return (await this.ask<{ commands: CommandRecord[] }>('GET', path)).commands;
   };
-  robot_markers = async (robot_id: string, after: number) =>
-    (
-      await this.ask<{ markers: MarkerRecord[] }>(
-        'GET',
-        past(robot_id, 'markers', after > 0 ? { after, limit: 1000 } : { limit: 1000 }),
-      )
-    ).markers;
+  // A page; `after` null: the first.
+  robot_markers = (robot_id: string, after: number | null) =>
+    this.ask<{ markers: MarkerRecord[]; next: number | null }>(
+      'GET',
+      past(robot_id, 'markers', after === null ? { limit: 1000 } : { after, limit: 1000 }),
+    );
   robot_runs = async (robot_id: string) =>
     (await this.ask<{ runs: RunRecord[] }>('GET', `/runs?robot_id=${encodeURIComponent(robot_id)}&limit=200`)).runs;
   robot_parameters = (robot_id: string) => this.ask<ParametersInForce>('GET', past(robot_id, 'parameters', {}));

@@ -47,11 +47,11 @@ export class ExperimentsApi {
     );
     return lists.flatMap(({ experiments }) => experiments);
   };
-  // Newest first; `before` null: from the newest on. Fewer than kPage: there are no older ones.
+  // Newest first; `before` null: from the newest on.
   page = async (robot_id: string, before: number | null) => {
     const path = `/experiments?${query_of({ robot_id, before, limit: kPage })}`;
-    const { experiments } = await this.ask<{ experiments: ExperimentSummary[] }>('GET', path);
-    return { experiments, is_last: experiments.length < kPage };
+    const { experiments, next } = await this.ask<Schemas['ExperimentList']>('GET', path);
+    return { experiments, is_last: next === null };
   };
   one = (experiment_id: number) => this.ask<Experiment>('GET', `/experiments/${experiment_id}`);
   prediction = (experiment_id: number, run: number) =>
@@ -87,8 +87,8 @@ export class ExperimentsApi {
   };
   past_reservations = async (before: number | null) => {
     const path = `/reservations?${query_of({ over: 'true', before, limit: kPage })}`;
-    const { reservations } = await this.ask<{ reservations: Reservation[] }>('GET', path);
-    return { reservations, is_last: reservations.length < kPage };
+    const { reservations, next } = await this.ask<Schemas['ReservationList']>('GET', path);
+    return { reservations, is_last: next === null };
   };
   reserve = (robot_id: string, body: ReservationBody) =>
     this.ask<Reservation>('POST', `${robot_path(robot_id)}/reservations`, body);

@@ -37,6 +37,7 @@ export const kReasons: Record<string, string> = {
   not_permitted: 'Your role does not allow that.',
   wrong_credentials: 'The user or the password is wrong.',
   no_credential: 'This page is signed out.',
+  wrong_token: 'The station does not know this token any more.',
 };
 
 // What helps after an event that ends motion for a reason that nobody sees.

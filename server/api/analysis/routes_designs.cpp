@@ -77,24 +77,24 @@ http::Answer store_design(DesignRoutes parts, http::Request request) {
 }
 
 http::Answer list_designs(DesignRoutes parts, http::Request request) {
-  const auto limit = query_number(request, "limit", 1, kMaxLimit, kDefaultLimit);
+  const auto limit = query_limit(request);
   if (!limit) co_return http::problem(limit.error());
-  const auto before = query_number(request, "before", 1, kMaxRunId, 0);
+  const auto before = query_number_cursor(request, "before");
   if (!before) co_return http::problem(before.error());
   const auto run = query_number(request, "run_id", 1, kMaxRunId, 0);
   if (!run) co_return http::problem(run.error());
   storage::DesignFilter filter;
   filter.before = *before;
-  filter.limit = static_cast<std::size_t>(*limit);
+  filter.limit = *limit + 1;
   if (*run != 0) filter.run = *run;
   if (const auto given = request.query.find("kind"); given != request.query.end()) {
     filter.kind = storage::design_kind_from(given->second);
     if (!filter.kind) co_return http::problem(400, "kind is none of model and controller", "out_of_range");
   }
-  json list = json::array();
   const auto designs = co_await parts.designs.list(filter);
-  for (const storage::Design& design : designs) list.push_back(to_json(design));
-  co_return http::json_response(200, {{"designs", std::move(list)}});
+  const auto json_of = [](const storage::Design& design) { return to_json(design); };
+  const auto cursor_of = [](const storage::Design& design) { return design.id; };
+  co_return http::json_response(200, page_json("designs", designs, *limit, json_of, cursor_of));
 }
 
 http::Answer get_design(DesignRoutes parts, http::Request request) {

@@ -177,14 +177,14 @@ http::Answer begin_job(JobRoutes parts, http::Request request) {
 }
 
 http::Answer list_jobs(JobRoutes parts, http::Request request) {
-  const auto limit = query_number(request, "limit", 1, kMaxLimit, kDefaultLimit);
+  const auto limit = query_limit(request);
   if (!limit) co_return http::problem(limit.error());
-  const auto before = query_number(request, "before", 1, kMaxRunId, 0);
+  const auto before = query_number_cursor(request, "before");
   if (!before) co_return http::problem(before.error());
-  const auto jobs = co_await parts.jobs.list(*before, static_cast<std::size_t>(*limit));
-  json list = json::array();
-  for (const storage::Job& job : jobs) list.push_back(to_json(job));
-  co_return http::json_response(200, {{"jobs", std::move(list)}});
+  const auto jobs = co_await parts.jobs.list(*before, *limit + 1);
+  const auto json_of = [](const storage::Job& job) { return to_json(job); };
+  const auto cursor_of = [](const storage::Job& job) { return job.id; };
+  co_return http::json_response(200, page_json("jobs", jobs, *limit, json_of, cursor_of));
 }
 
 // The result is JSON already, and may be long.
@@ -242,7 +242,7 @@ http::Answer cancel_job(JobRoutes parts, http::Request request) {
   if (job->request.owner != request.actor && !request.caller.scopes.allow(identity::Scope::admin)) {
     co_return http::problem(403,
                             fmt::format("job {} is of {}; its owner or an admin cancels it", *id, job->request.owner),
-                            "not_permitted");
+                            "not_permitted", {{"needs", text(identity::Role::admin)}});
   }
   const auto cancelled = co_await parts.jobs.cancel(*id);
   if (!cancelled) co_return http::problem(cancelled.error());

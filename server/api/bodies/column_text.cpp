@@ -26,8 +26,10 @@ void append_value(std::string& out, Enumerator value) {
 
 // What a sample's object ends with.
 std::string shared_text(const storage::Segment& segment) {
+  const bool is_received = segment.received_at_us != 0;
   std::string out = fmt::format(R"(,"clock_uncertainty_us":{},"first_received_at_us":{},"received_at_us":{})",
-                                segment.clock_uncertainty_us, segment.first_received_at_us, segment.received_at_us);
+                                segment.clock_uncertainty_us, segment.first_received_at_us,
+                                is_received ? std::to_string(segment.received_at_us) : "null");
   station::for_each_batch_field([&](const auto& field) {
     out += fmt::format(R"(,"{}":)", field.name);
     append_value(out, segment.context.*field.member);

@@ -34,6 +34,24 @@ std::unexpected<Error> missing(const char* name) {
   return fail(ErrorCode::bad_request, fmt::format("{} is missing", name), "missing_member");
 }
 
+// As JSON Schema has it: 2000.0 is one. NaN and the infinities are no JSON.
+bool is_integer(const json& value) {
+  if (!value.is_number_float()) return value.is_number_integer();
+  const auto number = value.get<double>();
+  return std::trunc(number) == number;
+}
+
+// Of an integer; none where it is beyond 64 bits, or is a number with a point beyond those that a double holds exactly.
+std::optional<std::int64_t> integer_of(const json& value) {
+  constexpr double kMostExact = 9'007'199'254'740'992;
+  if (value.is_number_float()) {
+    const auto number = value.get<double>();
+    return std::abs(number) <= kMostExact ? std::optional{static_cast<std::int64_t>(number)} : std::nullopt;
+  }
+  if (value.is_number_unsigned() && value.get<std::uint64_t>() > std::uint64_t{INT64_MAX}) return std::nullopt;
+  return value.get<std::int64_t>();
+}
+
 // Outside of texts. What is nested deeper would be written and destroyed by recursion as deep.
 bool is_nested_too_deep(const std::string& text) {
   int depth = 0;
@@ -136,14 +154,14 @@ Result<float> Members::number_as_float(const char* name) const {
 Result<std::int64_t> Members::integer(const char* name, Range<std::int64_t> allowed) const {
   if (!has(name)) return missing(name);
   const json& value = object_.at(name);
-  if (!value.is_number_integer()) return wrong_type(name, "an integer", value);
-  const bool beyond = value.is_number_unsigned() && value.get<std::uint64_t>() > std::uint64_t{INT64_MAX};
-  if (beyond || value.get<std::int64_t>() < allowed.minimum || value.get<std::int64_t>() > allowed.maximum) {
+  if (!is_integer(value)) return wrong_type(name, "an integer", value);
+  const std::optional<std::int64_t> integer = integer_of(value);
+  if (!integer || *integer < allowed.minimum || *integer > allowed.maximum) {
     return fail(ErrorCode::invalid,
                 fmt::format("{} = {} is outside {} to {}", name, quote(value), allowed.minimum, allowed.maximum),
                 "out_of_range");
   }
-  return value.get<std::int64_t>();
+  return *integer;
 }
 
 Result<void> Members::time(const char* name, std::optional<std::int64_t>& into) const {

@@ -113,4 +113,17 @@ nlohmann::json list_json(const char* name, const Items& items) {
   return {{name, std::move(list)}};
 }
 
+// A page of a list that was read with one more item than `limit`, which shows whether there are others:
+// {"<name>": [ … ], "next": the cursor of its last item, or null}
+template <class Items, class JsonOf, class CursorOf>
+nlohmann::json page_json(const char* name, const Items& items, std::size_t limit, JsonOf json_of, CursorOf cursor_of) {
+  nlohmann::json list = nlohmann::json::array(), next;
+  for (const auto& item : items) {
+    if (list.size() == limit) return {{name, std::move(list)}, {"next", std::move(next)}};
+    list.push_back(json_of(item));
+    next = cursor_of(item);
+  }
+  return {{name, std::move(list)}, {"next", nullptr}};
+}
+
 }  // namespace server::api

@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <array>
 #include <charconv>
 #include <limits>
 
@@ -13,6 +14,52 @@ namespace {
 
 constexpr std::int64_t kLatest = (std::int64_t{1} << 53) - 1;  // that a JavaScript number holds
 constexpr std::size_t kMaxQuotedParameter = 40;
+
+// "12-345" as two numbers; none when the text is anything else.
+template <std::size_t count>
+std::optional<std::array<std::uint64_t, count>> numbers_in(const std::string& text) {
+  std::array<std::uint64_t, count> numbers{};
+  const char* at = text.data();
+  const char* end = at + text.size();
+  for (std::size_t i = 0; i < count; ++i) {
+    if (i > 0 && (at == end || *at++ != '-')) return std::nullopt;
+    const auto [rest, error] = std::from_chars(at, end, numbers[i]);
+    if (error != std::errc{}) return std::nullopt;
+    at = rest;
+  }
+  if (at != end) return std::nullopt;
+  return numbers;
+}
+
+bool is_span(std::uint64_t number) { return number <= std::numeric_limits<std::uint32_t>::max(); }
+bool is_signed(std::uint64_t number) { return number <= std::uint64_t{std::numeric_limits<std::int64_t>::max()}; }
+
+std::optional<storage::RecordCursor> parse_record_cursor(const std::string& text) {
+  const auto numbers = numbers_in<2>(text);
+  if (!numbers || (*numbers)[0] > kLatest) return std::nullopt;
+  return storage::RecordCursor{static_cast<std::int64_t>((*numbers)[0]), static_cast<std::int64_t>((*numbers)[1])};
+}
+
+std::optional<storage::MarkerCursor> parse_marker_cursor(const std::string& text) {
+  const auto numbers = numbers_in<3>(text);
+  if (!numbers || !is_span((*numbers)[0]) || !is_signed((*numbers)[1]) || !is_signed((*numbers)[2]))
+    return std::nullopt;
+  return storage::MarkerCursor{static_cast<std::uint32_t>((*numbers)[0]), (*numbers)[1],
+                               static_cast<std::int64_t>((*numbers)[2])};
+}
+
+// None when the parameter is not given.
+template <class Cursor, class Parse>
+Result<std::optional<Cursor>> cursor_in(const http::Request& request, const char* name, Parse parse) {
+  const auto given = request.query.find(name);
+  if (given == request.query.end()) return std::optional<Cursor>{};
+  const std::optional<Cursor> cursor = parse(given->second);
+  if (cursor) return cursor;
+  return fail(ErrorCode::bad_request,
+              fmt::format("{} = '{}' is not the `next` of a page of this list; leave it out for the first page", name,
+                          given->second.substr(0, kMaxQuotedParameter)),
+              "out_of_range");
+}
 
 }  // namespace
 
@@ -43,24 +90,41 @@ Result<std::optional<bool>> query_flag(const http::Request& request, const std::
 }
 
 std::string cursor_text(const storage::SampleCursor& cursor) { return fmt::format("{}-{}", cursor.span, cursor.seq); }
+std::string cursor_text(const storage::RecordCursor& cursor) {
+  return fmt::format("{}-{}", cursor.at_us, static_cast<std::uint64_t>(cursor.row));
+}
+std::string cursor_text(const storage::MarkerCursor& cursor) {
+  return fmt::format("{}-{}-{}", cursor.span, cursor.seq, cursor.id);
+}
 
 std::optional<storage::SampleCursor> parse_cursor(const std::string& text) {
-  storage::SampleCursor cursor;
-  const char* end = text.data() + text.size();
-  const auto span = std::from_chars(text.data(), end, cursor.span);
-  if (span.ec != std::errc{} || span.ptr == end || *span.ptr != '-') return std::nullopt;
-  const auto seq = std::from_chars(span.ptr + 1, end, cursor.seq);
-  const bool is_number = seq.ec == std::errc{} && seq.ptr == end;
-  if (!is_number || cursor.seq > std::numeric_limits<std::int64_t>::max()) return std::nullopt;  // beyond any sample
-  return cursor;
+  const auto numbers = numbers_in<2>(text);
+  if (!numbers || !is_span((*numbers)[0]) || !is_signed((*numbers)[1])) return std::nullopt;
+  return storage::SampleCursor{static_cast<std::uint32_t>((*numbers)[0]), (*numbers)[1]};
 }
 
 Result<std::optional<storage::SampleCursor>> query_cursor(const http::Request& request) {
-  const auto given = request.query.find("after");
-  if (given == request.query.end()) return std::optional<storage::SampleCursor>{};
-  const auto cursor = parse_cursor(given->second);
-  if (!cursor) return fail(ErrorCode::bad_request, "after is not the `next` of a page", "out_of_range");
-  return cursor;
+  return cursor_in<storage::SampleCursor>(request, "after", parse_cursor);
+}
+
+Result<std::optional<storage::MarkerCursor>> query_marker_cursor(const http::Request& request) {
+  return cursor_in<storage::MarkerCursor>(request, "after", parse_marker_cursor);
+}
+
+Result<std::int64_t> query_number_cursor(const http::Request& request, const char* name, std::int64_t first) {
+  const auto cursor = cursor_in<std::int64_t>(request, name, [first](const std::string& text) {
+    const auto number = numbers_in<1>(text);
+    const bool is_within = number && (*number)[0] <= kLatest && static_cast<std::int64_t>((*number)[0]) > first;
+    return is_within ? std::optional{static_cast<std::int64_t>((*number)[0])} : std::nullopt;
+  });
+  if (!cursor) return std::unexpected{cursor.error()};
+  return cursor->value_or(first);
+}
+
+Result<std::size_t> query_limit(const http::Request& request) {
+  const auto limit = query_number(request, "limit", 1, kMaxLimit, kDefaultLimit);
+  if (!limit) return std::unexpected{limit.error()};
+  return static_cast<std::size_t>(*limit);
 }
 
 Result<storage::Channels> query_channels(const http::Request& request) {
@@ -86,14 +150,18 @@ Result<std::optional<storage::TimeWindow>> query_window(const http::Request& req
 }
 
 Result<storage::RecordFilter> query_record_filter(const http::Request& request) {
-  const auto limit = query_number(request, "limit", 1, kMaxLimit, kDefaultLimit);
+  const auto limit = query_limit(request);
   if (!limit) return std::unexpected{limit.error()};
   const auto window = query_window(request);
   if (!window) return std::unexpected{window.error()};
+  const auto before = cursor_in<storage::RecordCursor>(request, "before", parse_record_cursor);
+  if (!before) return std::unexpected{before.error()};
   const auto renewals = query_flag(request, "renewals");
   if (!renewals) return std::unexpected{renewals.error()};
-  storage::RecordFilter filter{.limit = static_cast<std::size_t>(*limit)};
+  storage::RecordFilter filter;
+  filter.limit = *limit;
   if (*window) filter.window = **window;
+  filter.before = *before;
   filter.has_renewals = renewals->value_or(true);
   return filter;
 }

@@ -10,6 +10,7 @@
 #include "server/http/http.hpp"
 #include "server/runtime/result.hpp"
 #include "server/storage/query/history.hpp"
+#include "server/storage/runs/markers.hpp"
 
 namespace server::api {
 
@@ -20,11 +21,18 @@ Result<std::int64_t> query_number(const http::Request& request, const std::strin
 // `true` or `false`; none when it is not given.
 Result<std::optional<bool>> query_flag(const http::Request& request, const std::string& name);
 
-// A cursor is "span-seq"; opaque to its users.
+// Cursors: the `next` of a page, with which the following one is asked for. Of a list of what has a number it is that
+// number; else numbers with '-' between them, opaque to their users: samples "span-seq", events and commands
+// "time-row", markers of a run "span-seq-marker".
 std::string cursor_text(const storage::SampleCursor& cursor);
+std::string cursor_text(const storage::RecordCursor& cursor);
+std::string cursor_text(const storage::MarkerCursor& cursor);
 std::optional<storage::SampleCursor> parse_cursor(const std::string& text);
 // `after`; none when it is not given.
 Result<std::optional<storage::SampleCursor>> query_cursor(const http::Request& request);
+Result<std::optional<storage::MarkerCursor>> query_marker_cursor(const http::Request& request);
+// `before` or `after` of a list whose cursors are numbers; `first` when it is not given.
+Result<std::int64_t> query_number_cursor(const http::Request& request, const char* name, std::int64_t first = 0);
 
 // `channels`: names with commas between them, each once; all when it is not given.
 Result<storage::Channels> query_channels(const http::Request& request);
@@ -39,7 +47,8 @@ Result<storage::RunId> run_id_of(const http::Request& request);   // of the path
 
 inline constexpr std::int64_t kDefaultLimit = 100;  // of the entries of a list
 inline constexpr std::int64_t kMaxLimit = 1000;
-// `limit`, the window, and for commands `renewals`.
+Result<std::size_t> query_limit(const http::Request& request);
+// `limit`, the window, `before`, and for commands `renewals`.
 Result<storage::RecordFilter> query_record_filter(const http::Request& request);
 
 // What the path's run_id or robot_id and the window name.

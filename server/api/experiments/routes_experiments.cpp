@@ -57,22 +57,22 @@ http::Answer begin_experiment(ExperimentRoutes parts, http::Request request) {
 }
 
 http::Answer list_experiments(ExperimentRoutes parts, http::Request request) {
-  const auto limit = query_number(request, "limit", 1, kMaxLimit, kDefaultLimit);
+  const auto limit = query_limit(request);
   if (!limit) co_return http::problem(limit.error());
-  const auto before = query_number(request, "before", 1, kMaxRunId, 0);
+  const auto before = query_number_cursor(request, "before");
   if (!before) co_return http::problem(before.error());
   storage::ExperimentFilter filter;
   filter.before = *before;
-  filter.limit = static_cast<std::size_t>(*limit);
+  filter.limit = *limit + 1;
   if (const auto given = request.query.find("robot_id"); given != request.query.end()) filter.robot_id = given->second;
   if (const auto given = request.query.find("state"); given != request.query.end()) {
     filter.state = storage::experiment_state_from(given->second);
     if (!filter.state) co_return http::problem(400, "state is none that an experiment has", "out_of_range");
   }
-  json list = json::array();
   const auto views = co_await parts.experiments.list(std::move(filter));
-  for (const experiments::ExperimentView& view : views) list.push_back(summary_json(view));
-  co_return http::json_response(200, {{"experiments", std::move(list)}});
+  const auto json_of = [](const experiments::ExperimentView& view) { return summary_json(view); };
+  const auto cursor_of = [](const experiments::ExperimentView& view) { return view.experiment.id; };
+  co_return http::json_response(200, page_json("experiments", views, *limit, json_of, cursor_of));
 }
 
 http::Answer get_experiment(ExperimentRoutes parts, http::Request request) {

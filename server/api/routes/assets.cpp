@@ -73,6 +73,15 @@ std::string expanded(std::string_view gzip) {
   return text;
 }
 
+// The file of the cockpit at the path, compressed or not; nullptr when there is none.
+const base::EmbeddedFile* cockpit_file(std::string_view path) {
+  const auto files = cockpit_files();
+  const auto found = std::ranges::find_if(files, [path](const base::EmbeddedFile& file) {
+    return file.name == path || (file.name.starts_with(path) && file.name.substr(path.size()) == kCompressed);
+  });
+  return found == files.end() ? nullptr : &*found;
+}
+
 }  // namespace
 
 http::Response asset_response(const http::Request& request, const base::EmbeddedFile& file) {
@@ -102,11 +111,7 @@ http::Response page_response(const http::Request& request) {
     return response;
   }
   const std::string path = request.path == "/" ? "/index.html" : request.path;
-  const auto files = cockpit_files();
-  const auto found = std::ranges::find_if(files, [&path](const base::EmbeddedFile& file) {
-    return file.name == path || (file.name.starts_with(path) && file.name.substr(path.size()) == kCompressed);
-  });
-  if (found != files.end()) return asset_response(request, *found);
+  if (const base::EmbeddedFile* file = cockpit_file(path)) return asset_response(request, *file);
   if (path == "/index.html") {
     return http::html_response(
         200,
@@ -116,12 +121,21 @@ http::Response page_response(const http::Request& request) {
   return http::problem(404, "there is nothing at this path", "unknown_path");
 }
 
-std::string_view page_of_an_old_link() {
-  const auto files = cockpit_files();
-  const auto cockpit = std::ranges::find(files, "/index.html", &base::EmbeddedFile::name);
-  if (cockpit != files.end()) return cockpit->content;
-  return "<!doctype html><title>Rheonaut</title><p>This link was used already, or is older than 10 minutes. On the "
-         "station's machine, `rheonaut login-link --data FOLDER` makes a new one.";
+http::Response old_link_response(http::Request request) {
+  const base::EmbeddedFile* cockpit = cockpit_file("/index.html");
+  if (cockpit == nullptr) {
+    return http::html_response(
+        401,
+        "<!doctype html><title>Rheonaut</title><p>This link was used already, or is older than 10 minutes. On the "
+        "station's machine, `rheonaut login-link --data FOLDER` makes a new one.");
+  }
+  request.headers.erase("if-none-match");
+  http::Response response = asset_response(request, *cockpit);
+  response.status = 401;
+  std::erase_if(response.headers,
+                [](const auto& field) { return field.first == "ETag" || field.first == "Cache-Control"; });
+  response.headers.emplace_back("Cache-Control", "no-store");
+  return response;
 }
 
 }  // namespace server::api

@@ -13,6 +13,7 @@ add_custom_command(
   COMMAND ${PYTHON3} ${PROJECT_SOURCE_DIR}/cmake/gzip_texts.py ${RHEONAUT_WEB_DIST} ${compressed}
   COMMAND ${CMAKE_COMMAND} -E touch ${compressed}.made
   DEPENDS ${PROJECT_SOURCE_DIR}/cmake/gzip_texts.py ${cockpit}
+  DEPFILE ${compressed}.d
   COMMENT "Compressing the cockpit's texts"
   VERBATIM)
 rheonaut_embed(server_api_routes server::api::cockpit_files FILES /=${compressed}/ DEPENDS ${compressed}.made)

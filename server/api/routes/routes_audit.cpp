@@ -46,12 +46,12 @@ Result<storage::AuditFilter> filter_of(const http::Request& request) {
     if (!time_us) return std::unexpected{time_us.error()};
     *bound = *time_us;
   }
-  const auto before = query_number(request, "before", 1, kMaxNumber, 0);
+  const auto before = query_number_cursor(request, "before");
   if (!before) return std::unexpected{before.error()};
   filter.before = *before;
-  const auto limit = query_number(request, "limit", 1, kMaxLimit, kDefaultLimit);
+  const auto limit = query_limit(request);
   if (!limit) return std::unexpected{limit.error()};
-  filter.limit = static_cast<std::size_t>(*limit);
+  filter.limit = *limit;
   return filter;
 }
 
@@ -61,7 +61,7 @@ http::Answer list_audit(AuditRoutes parts, http::Request request) {
   const storage::AuditPage page = co_await parts.history.audit(*filter);
   json body{{"entries", json::array()}};
   for (const storage::AuditEntry& entry : page.entries) body["entries"].push_back(to_json(entry));
-  body["next_before"] = page.next == 0 ? json(nullptr) : json(page.next);
+  body["next"] = page.next == 0 ? json(nullptr) : json(page.next);
   body["head"] = page.head.entry == 0 ? json(nullptr) : json(text(page.head));
   co_return http::json_response(200, body);
 }

@@ -99,10 +99,11 @@ Result<void> set_age(station::CommandRequest& command, const ParsedCommand& pars
   return {};
 }
 
-// A request that is refused before it reaches the station: it is no command or action that the station knows.
+// A request that is refused before it reaches the station: it is no command or action that the station knows, or one
+// that only an admin may send.
 http::Response refused(CommandRoutes parts, const http::Request& request, const char* what, const Error& error) {
   parts.station.note_refusal(author_of(request, parts.clock), request.param.at("robot_id"), what, "{}", error);
-  return http::problem(error);
+  return http::problem(error, identity::Role::admin);
 }
 
 // Whether the controller that comes into force has more of the motor than the one in force; also when that is not
@@ -204,7 +205,11 @@ http::Answer submit_command(CommandRoutes parts, http::Request request) {
   const station::CommandId key_id = station::command_id_of(id, request.actor, *key);
   if (!key->empty()) co_await recall(parts, id, key_id);
 
-  if (auto stands = still_stands(request.caller); !stands) co_return refused(parts, request, "command", stands.error());
+  if (auto stands = still_stands(request.caller); !stands) {
+    const Error& error = stands.error();
+    parts.station.note_refusal(author_of(request, parts.clock), id, "command", "{}", error);
+    co_return http::problem(error);
+  }
   const station::RobotSettings* settings = parts.station.settings(id);
   const station::CommandRecord* first = key->empty() ? nullptr : parts.station.known_command(id, key_id);
   const auto complete_from = controller_to_complete_from(first, settings);
@@ -310,8 +315,10 @@ http::Answer list_commands(CommandRoutes parts, http::Request request) {
   if (parts.station.find(id) == nullptr) co_return unknown_robot(id);
   const auto filter = query_record_filter(request);
   if (!filter) co_return http::problem(filter.error());
-  const auto records = co_await parts.history.commands(id, *filter);
-  co_return http::json_response(200, list_json("commands", records));
+  const auto page = co_await parts.history.commands(id, *filter);
+  json body = list_json("commands", page.records);
+  body["next"] = page.next ? json(cursor_text(*page.next)) : json(nullptr);
+  co_return http::json_response(200, body);
 }
 
 // A token that may stop and not read sees its own stops, and one that no robot has acknowledged yet: it may be the
@@ -340,8 +347,8 @@ void add_command_routes(http::Router& router, CommandRoutes parts) {
                                     http::Answer (*answer)(CommandRoutes, http::Request)) {
     router.add({method, pattern, needs, std::move(query), with(parts, answer)});
   };
-  add("GET", "/api/v1/robots/{robot_id}/commands", identity::Scope::read, {"limit", "from_us", "to_us", "renewals"},
-      list_commands);
+  add("GET", "/api/v1/robots/{robot_id}/commands", identity::Scope::read,
+      {"limit", "before", "from_us", "to_us", "renewals"}, list_commands);
   add("POST", "/api/v1/robots/{robot_id}/commands", identity::Scope::command, {"wait"}, submit_command);
   add("POST", "/api/v1/robots/{robot_id}/control", identity::Scope::command, {}, change_control);
   add("GET", "/api/v1/commands/{command_id}", identity::Scope::look, {}, get_command);

@@ -2,7 +2,6 @@
 #include <fmt/format.h>
 
 #include "server/api/bodies/json.hpp"
-#include "server/api/bodies/limits.hpp"
 #include "server/api/bodies/query_params.hpp"
 #include "server/api/routes/routes.hpp"
 #include "server/station/station.hpp"
@@ -12,8 +11,6 @@ namespace server::api {
 using nlohmann::json;
 
 namespace {
-
-constexpr std::int64_t kMaxMarkerId = kMaxJavaScriptInteger;
 
 json to_json(const storage::Marker& marker) {
   json out;
@@ -26,12 +23,6 @@ json to_json(const storage::Marker& marker) {
   out["actor"] = marker.actor;
   out["made_at_us"] = marker.made_at_us;
   return out;
-}
-
-json markers_json(const std::vector<storage::Marker>& markers) {
-  json list = json::array();
-  for (const storage::Marker& marker : markers) list.push_back(to_json(marker));
-  return {{"markers", std::move(list)}};
 }
 
 http::Response no_such_robot(const std::string& robot_id) {
@@ -54,20 +45,29 @@ http::Answer add_marker(MarkerRoutes parts, http::Request request) {
 http::Answer list_markers(MarkerRoutes parts, http::Request request) {
   const std::string robot_id = request.param.at("robot_id");
   if (parts.station.find(robot_id) == nullptr) co_return no_such_robot(robot_id);
-  const auto after = query_number(request, "after", 1, kMaxMarkerId, 0);
+  const auto after = query_number_cursor(request, "after");
   if (!after) co_return http::problem(after.error());
-  const auto limit = query_number(request, "limit", 1, kMaxLimit, kDefaultLimit);
+  const auto limit = query_limit(request);
   if (!limit) co_return http::problem(limit.error());
-  const auto markers = co_await parts.markers.of_robot(robot_id, *after, static_cast<std::size_t>(*limit));
-  co_return http::json_response(200, markers_json(markers));
+  const auto markers = co_await parts.markers.of_robot(robot_id, *after, *limit + 1);
+  const auto json_of = [](const storage::Marker& marker) { return to_json(marker); };
+  const auto cursor_of = [](const storage::Marker& marker) { return marker.id; };
+  co_return http::json_response(200, page_json("markers", markers, *limit, json_of, cursor_of));
 }
 
 http::Answer list_markers_of_run(MarkerRoutes parts, http::Request request) {
   const auto id = run_id_of(request);
   if (!id) co_return http::problem(id.error());
-  const auto markers = co_await parts.markers.of_run(*id);
-  if (!markers) co_return http::problem(markers.error());
-  co_return http::json_response(200, markers_json(*markers));
+  const auto after = query_marker_cursor(request);
+  if (!after) co_return http::problem(after.error());
+  const auto limit = query_limit(request);
+  if (!limit) co_return http::problem(limit.error());
+  const auto page = co_await parts.markers.of_run(*id, *after, *limit);
+  if (!page) co_return http::problem(page.error());
+  json list = json::array();
+  for (const storage::Marker& marker : page->markers) list.push_back(to_json(marker));
+  const json next = page->next ? json(cursor_text(*page->next)) : json(nullptr);
+  co_return http::json_response(200, {{"markers", std::move(list)}, {"next", next}});
 }
 
 }  // namespace
@@ -80,7 +80,7 @@ void add_marker_routes(http::Router& router, MarkerRoutes parts) {
   };
   add("POST", "/api/v1/robots/{robot_id}/markers", identity::Scope::record, {}, add_marker);
   add("GET", "/api/v1/robots/{robot_id}/markers", identity::Scope::read, {"after", "limit"}, list_markers);
-  add("GET", "/api/v1/runs/{run_id}/markers", identity::Scope::read, {}, list_markers_of_run);
+  add("GET", "/api/v1/runs/{run_id}/markers", identity::Scope::read, {"after", "limit"}, list_markers_of_run);
 }
 
 }  // namespace server::api

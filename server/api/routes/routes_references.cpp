@@ -171,20 +171,21 @@ http::Answer remove_reference(ReferenceRoutes parts, http::Request request) {
 http::Answer list_positions(ReferenceRoutes parts, http::Request request) {
   const auto run = run_id_of(request);
   if (!run) co_return http::problem(run.error());
-  const auto after = query_number(request, "after", 0, kMaxJavaScriptInteger, -1);
+  const auto after = query_number_cursor(request, "after", -1);
   if (!after) co_return http::problem(after.error());
   const auto limit = query_number(request, "limit", 1, kMaxPagePositions, kMaxPagePositions);
   if (!limit) co_return http::problem(limit.error());
   const auto after_us = *after < 0 ? std::nullopt : std::optional{static_cast<std::uint64_t>(*after)};
-  const auto found = co_await parts.references.page(*run, after_us, static_cast<std::size_t>(*limit));
+  auto found = co_await parts.references.page(*run, after_us, static_cast<std::size_t>(*limit) + 1);
   if (!found) co_return http::problem(found.error());
-  const storage::OutsidePositions& positions = found->positions;
-  const bool is_full = positions.size() == static_cast<std::size_t>(*limit);
+  storage::OutsidePositions& positions = found->positions;
+  const bool is_more = positions.size() > static_cast<std::size_t>(*limit);
+  if (is_more) positions.resize(static_cast<std::size_t>(*limit));
   co_return http::json_response(200, {{"span", found->reference.span},
                                       {"robot_time_us", positions.robot_time_us},
                                       {"position_m", positions.position_m},
                                       {"position_sd_m", positions.position_sd_m},
-                                      {"next", is_full ? json(positions.robot_time_us.back()) : json(nullptr)}});
+                                      {"next", is_more ? json(positions.robot_time_us.back()) : json(nullptr)}});
 }
 
 }  // namespace

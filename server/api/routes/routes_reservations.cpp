@@ -85,7 +85,7 @@ http::Answer make_reservation(ReservationRoutes parts, http::Request request) {
   auto wanted = parse_reservation(request.body, parts.clock.utc_us());
   if (!wanted) co_return http::problem(wanted.error());
   auto holder = holder_of(parts, request, wanted->holder);
-  if (!holder) co_return http::problem(holder.error());
+  if (!holder) co_return http::problem(holder.error(), identity::Role::admin);
   wanted->robot_id = robot_id;
   wanted->holder = std::move(*holder);
   if (auto stands = still_stands(request.caller); !stands) co_return http::problem(stands.error());
@@ -103,19 +103,21 @@ http::Answer make_reservation(ReservationRoutes parts, http::Request request) {
 }
 
 http::Answer list_reservations(ReservationRoutes parts, http::Request request) {
-  const auto limit = query_number(request, "limit", 1, kMaxLimit, kDefaultLimit);
+  const auto limit = query_limit(request);
   if (!limit) co_return http::problem(limit.error());
-  const auto before = query_number(request, "before", 1, kMaxRunId, 0);
+  const auto before = query_number_cursor(request, "before");
   if (!before) co_return http::problem(before.error());
   storage::ReservationFilter filter;
   filter.before = *before;
-  filter.limit = static_cast<std::size_t>(*limit);
+  filter.limit = *limit + 1;
   if (const auto given = request.query.find("robot_id"); given != request.query.end()) filter.robot_id = given->second;
   const auto is_over = query_flag(request, "over");
   if (!is_over) co_return http::problem(is_over.error());
   filter.is_over = *is_over;
   const auto found = co_await parts.reservations.list(std::move(filter));
-  co_return http::json_response(200, list_json("reservations", found));
+  const auto json_of = [](const Reservation& reservation) { return live::to_json(reservation); };
+  const auto cursor_of = [](const Reservation& reservation) { return reservation.id; };
+  co_return http::json_response(200, page_json("reservations", found, *limit, json_of, cursor_of));
 }
 
 http::Answer cancel_reservation(ReservationRoutes parts, http::Request request) {
@@ -127,7 +129,7 @@ http::Answer cancel_reservation(ReservationRoutes parts, http::Request request) 
   const bool is_own = reservation->holder == parts.station.account_of(request.actor);
   if (!is_own && !is_admin(request)) {
     co_return http::problem(403, fmt::format("only {} or an administrator cancels it", reservation->holder),
-                            "not_permitted");
+                            "not_permitted", {{"needs", text(identity::Role::admin)}});
   }
   const auto cancelled = co_await parts.reservations.cancel(*id, author_of(request, parts.clock));
   if (!cancelled) co_return http::problem(cancelled.error());

@@ -90,8 +90,10 @@ http::Answer list_events(RobotRoutes parts, http::Request request) {
   if (parts.station.find(id) == nullptr) co_return unknown_robot(id);
   const auto filter = query_record_filter(request);
   if (!filter) co_return http::problem(filter.error());
-  const auto events = co_await parts.history.events(id, *filter);
-  co_return http::json_response(200, list_json("events", events));
+  const auto page = co_await parts.history.events(id, *filter);
+  json body = list_json("events", page.records);
+  body["next"] = page.next ? json(cursor_text(*page.next)) : json(nullptr);
+  co_return http::json_response(200, body);
 }
 
 }  // namespace
@@ -103,7 +105,7 @@ void add_robot_routes(http::Router& router, RobotRoutes parts) {
   };
   add("/api/v1/robots", identity::Scope::look, {}, list_robots);
   add("/api/v1/robots/{robot_id}", identity::Scope::look, {}, get_robot);
-  add("/api/v1/robots/{robot_id}/events", identity::Scope::read, {"limit", "from_us", "to_us"}, list_events);
+  add("/api/v1/robots/{robot_id}/events", identity::Scope::read, {"limit", "before", "from_us", "to_us"}, list_events);
 }
 
 }  // namespace server::api

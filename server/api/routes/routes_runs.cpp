@@ -20,13 +20,13 @@ using nlohmann::json;
 namespace {
 
 http::Answer list_runs(RunRoutes parts, http::Request request) {
-  const auto limit = query_number(request, "limit", 1, kMaxLimit, kDefaultLimit);
+  const auto limit = query_limit(request);
   if (!limit) co_return http::problem(limit.error());
-  const auto before = query_number(request, "before", 1, kMaxRunId, 0);
+  const auto before = query_number_cursor(request, "before");
   if (!before) co_return http::problem(before.error());
   storage::RunFilter filter;
   filter.before = *before;
-  filter.limit = static_cast<std::size_t>(*limit);
+  filter.limit = *limit + 1;
   if (const auto given = request.query.find("robot_id"); given != request.query.end()) filter.robot_id = given->second;
   if (const auto given = request.query.find("state"); given != request.query.end()) {
     filter.state = storage::run_state_from(given->second);
@@ -35,7 +35,9 @@ http::Answer list_runs(RunRoutes parts, http::Request request) {
     }
   }
   const auto runs = co_await parts.runs.list(std::move(filter));
-  co_return http::json_response(200, list_json("runs", runs));
+  const auto json_of = [](const storage::Run& run) { return api::to_json(run); };
+  const auto cursor_of = [](const storage::Run& run) { return run.id; };
+  co_return http::json_response(200, page_json("runs", runs, *limit, json_of, cursor_of));
 }
 
 // SAFETY: the fluid named for a robot decides which limits hold and which model it is sent, so naming it is a command.
@@ -64,7 +66,7 @@ http::Answer create_run(RunRoutes parts, http::Request request) {
   }
   if (!run_request->range) {
     const auto named = may_name_fluid(parts, request, run_request->robot_id, run_request->conditions.fluid);
-    if (!named) co_return http::problem(named.error());
+    if (!named) co_return http::problem(named.error(), least_role(identity::Scope::command));
     if (!*named) run_request->conditions.fluid.clear();  // the run takes the robot's
   }
   storage::Runs& runs = parts.runs;
@@ -110,7 +112,7 @@ http::Answer annotate_run(RunRoutes parts, http::Request request) {
     if (auto stands = still_stands(request.caller); !stands) co_return http::problem(stands.error());
     const bool is_open = before->state == storage::RunState::open;
     const auto named = is_open ? may_name_fluid(parts, request, before->robot_id, fluid->second) : Result<bool>{true};
-    if (!named) co_return http::problem(named.error());
+    if (!named) co_return http::problem(named.error(), least_role(identity::Scope::command));
     annotation->names_fluid_of_robot = *named;
   }
   const auto run = co_await parts.runs.annotate(*id, *annotation, author_of(request, parts.clock));

@@ -50,7 +50,7 @@ http::Answer log_in(StationRoutes parts, http::Request request) {
   }
   const auto session = parts.auth.log_in(request.query["code"], request.peer, request.header("user-agent"));
   if (!session) {
-    co_return http::html_response(401, std::string{page_of_an_old_link()});
+    co_return old_link_response(std::move(request));
   }
   http::Response response = http::html_response(303, "");
   response.headers.emplace_back("Location", "/");

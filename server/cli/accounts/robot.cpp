@@ -49,7 +49,7 @@ int list_robots(const nlohmann::json& robots, bool as_json, std::ostream& out) {
   return 0;
 }
 
-int enroll(const RobotCommand& options, std::ostream& out) {
+int enrol(const RobotCommand& options, std::ostream& out) {
   const nlohmann::json made = AccountAccess{options.data_dir, AccountAccess::Missing::make}.enrol(options.robot_id);
   if (options.json) {
     fmt::print(out, "{}\n", made.dump(2));
@@ -69,10 +69,11 @@ int enroll(const RobotCommand& options, std::ostream& out) {
 
 void add_options(CLI::App& command, RobotCommand& options) {
   command.require_subcommand(1);
-  auto* enroll = offer(command, options, RobotCommand::Act::enroll, "enroll",
-                       "Give a robot a token and print it: it is shown only now");
-  enroll->add_option("robot_id", options.robot_id, "1 to 31 characters of [a-z0-9_-]")->required()->check(robot_id());
-  enroll->footer("Example: rheonaut robot enroll rheo-1 --data lab");
+  auto* enrol = offer(command, options, RobotCommand::Act::enrol, "enrol",
+                      "Give a robot a token and print it: it is shown only now");
+  enrol->alias("enroll");  // as it was spelled before
+  enrol->add_option("robot_id", options.robot_id, "1 to 31 characters of [a-z0-9_-]")->required()->check(robot_id());
+  enrol->footer("Example: rheonaut robot enrol rheo-1 --data lab");
   offer(command, options, RobotCommand::Act::list, "list", "List the robots that may or might connect");
   constexpr std::tuple<RobotCommand::Act, const char*, const char*> kOfOne[] = {
       {RobotCommand::Act::revoke, "revoke", "Refuse a robot from now on, and end its connection"},
@@ -92,7 +93,7 @@ void add_options(CLI::App& command, RobotCommand& options) {
 int run(const RobotCommand& options, std::ostream& out) {
   if (options.settings.of != RobotSettingsCommand::Of::nothing) return run(options.settings, out);
   if (options.reservations.act != RobotReservationCommand::Act::nothing) return run(options.reservations, out);
-  if (options.act == RobotCommand::Act::enroll) return enroll(options, out);
+  if (options.act == RobotCommand::Act::enrol) return enrol(options, out);
   AccountAccess accounts{options.data_dir, AccountAccess::Missing::refuse};
   if (options.act == RobotCommand::Act::list) return list_robots(accounts.enrolments(), options.json, out);
   if (options.act == RobotCommand::Act::revoke) {

@@ -17,7 +17,7 @@ class App;
 namespace server::cli {
 
 struct RobotCommand {
-  enum class Act : std::uint8_t { enroll, list, revoke, retire, unretire };
+  enum class Act : std::uint8_t { enrol, list, revoke, retire, unretire };
   Act act = Act::list;
   std::filesystem::path data_dir = "rheonaut-data";
   std::string robot_id;
@@ -28,7 +28,7 @@ struct RobotCommand {
 
 void add_options(CLI::App& command, RobotCommand& options);
 
-// `enroll` prints the robot's token and where it belongs; nobody can read it again. Throws std::runtime_error saying
+// `enrol` prints the robot's token and where it belongs; nobody can read it again. Throws std::runtime_error saying
 // why nothing was changed.
 int run(const RobotCommand& options, std::ostream& out);
 

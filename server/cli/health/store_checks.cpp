@@ -96,7 +96,7 @@ std::int64_t check_pages(SQLite::Database& database, const fs::path& path, Findi
 const char* remedy_of(const std::string& cause) {
   if (cause == "version") return "flash the robot with the firmware that belongs to this station (docs/robot.md)";
   if (cause == "wrong_token" || cause == "unknown_robot")
-    return "rheonaut robot enroll ID, and its token into the robot";
+    return "rheonaut robot enrol ID, and its token into the robot";
   if (cause == "already_connected") return "two robots have one name: give each its own";
   return "the robot's events say more: GET /api/v1/robots/ID/events";
 }
@@ -154,7 +154,7 @@ void judge_robots(std::size_t known, const RunningStation& running, Findings& fi
   if (known == 0) {
     const std::string where = running.robots.empty() ? "the station's robots address" : running.robots;
     return findings.note("robots", "no robot has ever connected",
-                         fmt::format("try one: rheonaut-sim --station {}; for a real one rheonaut robot enroll ID, and "
+                         fmt::format("try one: rheonaut-sim --station {}; for a real one rheonaut robot enrol ID, and "
                                      "docs/robot.md",
                                      where));
   }

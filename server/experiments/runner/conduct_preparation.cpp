@@ -158,6 +158,7 @@ asio::awaitable<std::uint64_t> Conduct::submit(const char* what, protocol::Comma
   request.arguments = std::move(arguments);
   request.actor = experiment_.acts_for;
   request.peer = peer();
+  request.answer_grace = station::kOwnAnswerGrace;
   request.takes_control = false;
   request.until_verified = command.which_action == rheonaut_Command_set_controller_tag;
   const auto sent = co_await parts_.driver.station.submit(std::move(request));

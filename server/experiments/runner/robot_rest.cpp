@@ -20,6 +20,7 @@ station::CommandRequest to_manual(const RestRequest& request) {
   command.actor = request.actor;
   command.peer = request.peer;
   command.time_to_live = 1s;
+  command.answer_grace = station::kOwnAnswerGrace;
   command.takes_control = false;
   return command;
 }

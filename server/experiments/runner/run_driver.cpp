@@ -198,6 +198,7 @@ station::CommandRequest RunDriver::request_of(const protocol::Command& command) 
   request.action = command;
   request.actor = request_.actor;
   request.peer = request_.peer;
+  request.answer_grace = station::kOwnAnswerGrace;
   request.takes_control = false;  // SAFETY: a program is no sign of life of its operator
   return request;
 }

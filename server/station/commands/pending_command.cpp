@@ -45,6 +45,7 @@ std::shared_ptr<PendingCommand> make_pending(boost::asio::io_context& loop, cons
     const std::int64_t left_us = std::max<std::int64_t>((request.time_to_live - request.age).count(), 0);
     pending->wire.valid_until_robot_us = static_cast<std::uint64_t>(robot_now_us(robot, clock) + left_us);
     pending->deadline_us = now_us + left_us;
+    pending->answer_due_us = pending->deadline_us + request.answer_grace.count();
     record.life_from = request.life_from;
   }
   return pending;

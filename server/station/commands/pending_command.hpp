@@ -26,7 +26,8 @@ struct PendingCommand {
 
   CommandRecord record;
   protocol::Command wire = rheonaut_Command_init_zero;
-  std::int64_t deadline_us = std::numeric_limits<std::int64_t>::max();
+  std::int64_t deadline_us = std::numeric_limits<std::int64_t>::max();    // of its time to live
+  std::int64_t answer_due_us = std::numeric_limits<std::int64_t>::max();  // sent: of the robot's answer
   std::uint64_t number = 0;         // counts the commands of its robot: a stop of a higher number was asked for later
   std::int64_t received_us = 0;     // when the request arrived at the station
   std::int64_t handed_at_us = 0;    // a stop: when it was last given to the link

@@ -14,7 +14,9 @@ namespace server::station {
 
 inline constexpr microseconds kControlLease{3'000'000};      // after the holder's last sign of life
 inline constexpr microseconds kLongestControl{600'000'000};  // that a script may ask for
-inline constexpr microseconds kOldestSight{400'000};         // of what a page has seen, to take or keep anything
+// What the station asks by itself may be answered so long after its life: a late answer is no reason to give up.
+inline constexpr microseconds kOwnAnswerGrace{1'000'000};
+inline constexpr microseconds kOldestSight{400'000};  // of what a page has seen, to take or keep anything
 inline bool is_fresh(microseconds age) { return age >= microseconds{0} && age <= kOldestSight; }
 
 // A request to command a robot. `action` has its action member set; the station fills id, boot and validity.
@@ -25,6 +27,7 @@ struct CommandRequest {
   std::string actor;
   std::string peer;                      // the address that it came from
   microseconds time_to_live{2'000'000};  // at most 10 s, from when it was issued
+  microseconds answer_grace{50'000};     // the robot's answer may come so long after it; then it is unknown
   microseconds age{0};                   // it was issued so long before it arrived
   std::string life_from = "arrival";     // how that is known, see CommandRecord
   microseconds unread{0};                // the station stood still: it may have waited for so long before it was read

@@ -11,6 +11,7 @@ CommandRequest set_parameter_request(const RobotId& id, const Author& by, const 
   request.robot_id = id;
   request.actor = by.actor;
   request.peer = by.peer;
+  request.answer_grace = kOwnAnswerGrace;
   request.takes_control = false;  // SAFETY: who named the fluid may be gone by now
   request.action = rheonaut_Command_init_zero;
   request.action.which_action = rheonaut_Command_set_parameter_tag;

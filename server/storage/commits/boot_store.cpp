@@ -181,7 +181,7 @@ station::Admission BootStore::check_robot(const station::AdmissionRequest& reque
   if (!known.executeStep()) {
     if (!may_enrol) {
       return refusal(rheonaut_REFUSAL_REASON_UNKNOWN_ROBOT,
-                     fmt::format("robot '{}' is not enrolled: rheonaut robot enroll {} gives it a token",
+                     fmt::format("robot '{}' is not enrolled: rheonaut robot enrol {} gives it a token",
                                  request.robot_id, request.robot_id));
     }
     if (auto full = check_room(request, enrolment)) return std::move(*full);
@@ -222,7 +222,7 @@ std::optional<station::Admission> BootStore::check_room(const station::Admission
   if (unsigned_id(count.getColumn(0)) >= enrolment.most_robots) {
     refused =
         refusal(rheonaut_REFUSAL_REASON_UNKNOWN_ROBOT,
-                fmt::format("only {} robots of this machine enrol themselves: rheonaut robot enroll {}, or make room "
+                fmt::format("only {} robots of this machine enrol themselves: rheonaut robot enrol {}, or make room "
                             "with rheonaut robot revoke, or allow more by robots.max_enrolled_on_loopback",
                             enrolment.most_robots, request.robot_id));
   } else if (unsigned_id(count.getColumn(1)) >= enrolment.most_a_minute) {

@@ -103,8 +103,9 @@ std::string CsvWriter::shared_text(const Segment& segment) const {
   std::size_t number = 0;
   station::for_each_batch_field([&]<class Value>(const station::BatchField<Value>& field) {
     if (number++ == kBeforeTimes) {
-      out +=
-          fmt::format(",{},{},{}", segment.clock_uncertainty_us, segment.first_received_at_us, segment.received_at_us);
+      const bool is_received = segment.received_at_us != 0;
+      out += fmt::format(",{},{},{}", segment.clock_uncertainty_us, segment.first_received_at_us,
+                         is_received ? std::to_string(segment.received_at_us) : "");
     }
     out += ',';
     const Value& value = segment.context.*field.member;

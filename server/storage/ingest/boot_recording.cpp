@@ -160,6 +160,12 @@ std::size_t BootRecording::segment_for(const station::SampleBatch& batch, std::u
   return waiting_.size() - 1;
 }
 
+bool BootRecording::may_grow(const Segment& waiting) const {
+  const std::uint64_t next = waiting.next_seq();
+  const bool is_complete = room_from(next) == static_cast<std::uint64_t>(kMaxSegmentSamples);
+  return !is_complete && !received_.contains(next);
+}
+
 void BootRecording::refuse(const station::SampleBatch& batch) {
   next_seq_ = std::max(next_seq_, batch.next_seq());
   refused_.erase_below(received_.first_hole());

@@ -87,6 +87,8 @@ class BootRecording {
   std::optional<Interval> overdue_samples(std::int64_t steady_us);
   bool has_overdue_events(std::int64_t steady_us);
 
+  // Whether samples may still be added to a waiting segment.
+  bool may_grow(const Segment& waiting) const;
   // Received, and not enqueued yet; in the order of arrival.
   const std::vector<Segment>& waiting() const { return waiting_; }
   const std::vector<LostRange>& waiting_gaps() const { return waiting_gaps_; }

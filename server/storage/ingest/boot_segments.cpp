@@ -26,16 +26,23 @@ void enqueue_everything(BootRegistry& boots, CommitQueue& queue) {
 
 std::vector<Segment> waiting_samples(const CommitQueue& queue, const BootEntry& boot, Interval range,
                                      std::size_t limit) {
-  std::vector<const Segment*> found = queue.segments_of(boot, range);
+  struct Found {
+    const Segment* segment;
+    bool may_grow;
+  };
+  std::vector<Found> found;
+  for (const Segment* segment : queue.segments_of(boot, range)) found.push_back({segment, false});
   for (const Segment& segment : boot.recording.waiting()) {
-    if (std::max(segment.first_seq, range.first) < std::min(segment.next_seq(), range.next)) found.push_back(&segment);
+    if (std::max(segment.first_seq, range.first) < std::min(segment.next_seq(), range.next))
+      found.push_back({&segment, boot.recording.may_grow(segment)});
   }
-  std::ranges::sort(found, {}, [](const Segment* segment) { return segment->first_seq; });
+  std::ranges::sort(found, {}, [](const Found& one) { return one.segment->first_seq; });
   std::vector<Segment> segments;
   std::size_t copied = 0;
-  for (auto segment = found.begin(); segment != found.end() && copied < limit; ++segment) {
-    Segment& part = segments.emplace_back(part_of(**segment, range));
+  for (auto one = found.begin(); one != found.end() && copied < limit; ++one) {
+    Segment& part = segments.emplace_back(part_of(*one->segment, range));
     std::ranges::transform(part.samples, part.samples.begin(), as_stored);
+    if (one->may_grow) part.received_at_us = 0;
     copied += part.samples.size();
   }
   return segments;

@@ -18,7 +18,9 @@ void enqueue_due(BootRegistry& boots, CommitQueue& queue, std::int64_t now_us);
 void enqueue_everything(BootRegistry& boots, CommitQueue& queue);
 
 // What was received of a boot and is not durable yet, wherever it waits, in the form in which the database will give it
-// back. Samples of the range, ascending, cut to it: of the first segments that have `limit` samples together.
+// back. Samples of the range, ascending, cut to it: of the first segments that have `limit` samples together. When the
+// last sample of a segment has arrived is not said while others may follow it, so that a time which was read once stays
+// the same; clock_uncertainty_us may grow until then.
 std::vector<Segment> waiting_samples(const CommitQueue& queue, const BootEntry& boot, Interval range,
                                      std::size_t limit);
 

@@ -20,8 +20,37 @@ constexpr std::size_t kSliceSegments = 5'000;
 constexpr std::size_t kSliceBoots = 100;
 constexpr std::size_t kWaitingInATurn = 10'000;  // samples, in a turn of the loop
 
-std::int64_t clamped(std::size_t limit) {
-  return static_cast<std::int64_t>(std::clamp<std::size_t>(limit, 1, kMaxListed));
+// A page of the rows of a robot, newest first, whose SQL takes: robot, time from, time to, time and row of the cursor,
+// limit. One more row than the page has shows whether there are others.
+template <class Record>
+RecordPage<Record> read_records(SQLite::Statement& rows, const station::RobotId& robot_id, const RecordFilter& filter,
+                                Record (*record_from)(SQLite::Statement&),
+                                RecordCursor (*cursor_of)(SQLite::Statement&)) {
+  const auto limit = std::clamp<std::size_t>(filter.limit, 1, kMaxListed);
+  std::int64_t to_us = filter.window.to_us;
+  std::optional<std::int64_t> at_us, row;
+  if (filter.before) {
+    at_us = filter.before->at_us;
+    row = filter.before->row;
+    to_us = std::min(to_us, *at_us + 1);
+  }
+  bind_all(rows, robot_id, filter.window.from_us, to_us, at_us, row, static_cast<std::int64_t>(limit) + 1);
+  RecordPage<Record> page;
+  while (rows.executeStep()) {
+    if (page.records.size() == limit) return page;
+    page.records.push_back(record_from(rows));
+    page.next = cursor_of(rows);
+  }
+  page.next.reset();
+  return page;
+}
+
+RecordCursor event_cursor(SQLite::Statement& row) {
+  return {row.getColumn(kEventReceivedAt).getInt64(), row.getColumn(kEventRow).getInt64()};
+}
+
+RecordCursor command_cursor(SQLite::Statement& row) {
+  return {row.getColumn(kCommandSubmittedAt).getInt64(), row.getColumn(kCommandId).getInt64()};
 }
 
 // As the database has them, without what waits.
@@ -183,31 +212,27 @@ asio::awaitable<Result<Overview>> History::overview(Excerpt excerpt, OverviewQue
   co_return overview;
 }
 
-asio::awaitable<std::vector<station::RobotEvent>> History::events(station::RobotId robot_id, RecordFilter filter) {
+asio::awaitable<RecordPage<station::RobotEvent>> History::events(station::RobotId robot_id, RecordFilter filter) {
   auto query = [robot_id, filter](SQLite::Database& database) {
-    std::vector<station::RobotEvent> events;
-    SQLite::Statement rows{database, select_events("WHERE event.robot_id = ? AND event.received_at_us >= ?"
-                                                   " AND event.received_at_us < ?"
-                                                   " ORDER BY event.received_at_us DESC, event_row DESC LIMIT ?")};
-    bind_all(rows, robot_id, filter.window.from_us, filter.window.to_us, clamped(filter.limit));
-    while (rows.executeStep()) events.push_back(event_from(rows));
-    return events;
+    SQLite::Statement rows{database,
+                           select_events("WHERE event.robot_id = ?1 AND received_at_us >= ?2 AND received_at_us < ?3"
+                                         " AND (?4 IS NULL OR (received_at_us, event_row) < (?4, ?5))"
+                                         " ORDER BY received_at_us DESC, event_row DESC LIMIT ?6")};
+    return read_records(rows, robot_id, filter, event_from, event_cursor);
   };
   co_await recorder_.flush_records();
   co_return co_await reader_.ask(std::move(query));
 }
 
-asio::awaitable<std::vector<station::CommandRecord>> History::commands(station::RobotId robot_id, RecordFilter filter) {
+asio::awaitable<RecordPage<station::CommandRecord>> History::commands(station::RobotId robot_id, RecordFilter filter) {
   auto query = [robot_id, filter](SQLite::Database& database) {
-    std::vector<station::CommandRecord> commands;
-    SQLite::Statement rows{database,
-                           select_commands("WHERE robot_id = ? AND submitted_at_us >= ? AND submitted_at_us < ?"
-                                           " AND kind <> ?"
-                                           " ORDER BY submitted_at_us DESC LIMIT ?")};
-    bind_all(rows, robot_id, filter.window.from_us, filter.window.to_us, filter.has_renewals ? "" : "renew_lease",
-             clamped(filter.limit));
-    while (rows.executeStep()) commands.push_back(command_from(rows));
-    return commands;
+    const std::string condition = fmt::format(
+        "WHERE robot_id = ?1 AND submitted_at_us >= ?2 AND submitted_at_us < ?3"
+        " AND (?4 IS NULL OR (submitted_at_us, command_id) < (?4, ?5)){}"
+        " ORDER BY submitted_at_us DESC, command_id DESC LIMIT ?6",
+        filter.has_renewals ? "" : " AND kind <> 'renew_lease'");
+    SQLite::Statement rows{database, select_commands(condition.c_str())};
+    return read_records(rows, robot_id, filter, command_from, command_cursor);
   };
   co_await recorder_.flush_records();
   co_return co_await reader_.ask(std::move(query));

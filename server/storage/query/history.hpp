@@ -52,11 +52,24 @@ struct Overview {
 inline constexpr std::size_t kMaxPageSamples = 10'000;
 inline constexpr std::size_t kMaxPageGaps = 10'000;
 
+// The place of an event or a command in its list: the time that orders it, and its row among those of that time.
+struct RecordCursor {
+  std::int64_t at_us = 0;
+  std::int64_t row = 0;
+};
+
 // Of the events or the commands of a robot.
 struct RecordFilter {
   std::size_t limit = 100;  // 1 to 1000
   TimeWindow window{std::numeric_limits<std::int64_t>::min(), std::numeric_limits<std::int64_t>::max()};
+  std::optional<RecordCursor> before{};
   bool has_renewals = true;  // false: commands of kind renew_lease are left out
+};
+
+template <class Record>
+struct RecordPage {
+  std::vector<Record> records;
+  std::optional<RecordCursor> next;  // of the last one of the page; empty: the end
 };
 
 class History {
@@ -80,8 +93,8 @@ class History {
                                                                   std::size_t limit = Recorder::kAll);
 
   // Newest first, by the time at which the station received the event, or was asked for the command.
-  boost::asio::awaitable<std::vector<station::RobotEvent>> events(station::RobotId robot_id, RecordFilter filter);
-  boost::asio::awaitable<std::vector<station::CommandRecord>> commands(station::RobotId robot_id, RecordFilter filter);
+  boost::asio::awaitable<RecordPage<station::RobotEvent>> events(station::RobotId robot_id, RecordFilter filter);
+  boost::asio::awaitable<RecordPage<station::CommandRecord>> commands(station::RobotId robot_id, RecordFilter filter);
   boost::asio::awaitable<Result<station::CommandRecord>> command(station::CommandId id);
 
   boost::asio::awaitable<AuditPage> audit(AuditFilter filter);

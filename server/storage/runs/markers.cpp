@@ -3,8 +3,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-
 #include "server/storage/database/statement.hpp"
 #include "server/storage/runs/run_queries.hpp"
 #include "server/storage/runs/run_spans.hpp"
@@ -15,14 +13,24 @@ namespace asio = boost::asio;
 namespace {
 
 constexpr std::size_t kMaxTextBytes = 4000;
-constexpr std::size_t kMaxListed = 1000;
+
+// With which sample the open run of the boot begins.
+std::optional<std::uint64_t> begin_of_open_run(SQLite::Database& database, std::int64_t boot_key) {
+  SQLite::Statement open{database, "SELECT max(first_seq) FROM run_span WHERE boot_key = ? AND last_seq IS NULL"};
+  bind_all(open, boot_key);
+  if (!open.executeStep() || open.getColumn(0).isNull()) return std::nullopt;
+  return unsigned_id(open.getColumn(0));
+}
 
 std::optional<BootSample> sample_of(SQLite::Database& database, const MarkerRequest& request, const BootHeads& heads) {
   if (request.at_us) return sample_at(database, heads, request.robot_id, *request.at_us);
   const auto boot = samples_of_boot(database, request.robot_id, request.boot_id);
   const auto head = heads.find(request.boot_id);
-  if (!boot || head == heads.end() || head->second == 0) return std::nullopt;
-  return BootSample{boot->boot_key, boot->boot_id, head->second - 1};
+  if (!boot || head == heads.end()) return std::nullopt;
+  const std::uint64_t next = head->second;
+  if (begin_of_open_run(database, boot->boot_key) == next) return BootSample{boot->boot_key, boot->boot_id, next};
+  if (next == 0) return std::nullopt;
+  return BootSample{boot->boot_key, boot->boot_id, next - 1};
 }
 
 Result<Marker> insert(SQLite::Database& database, const MarkerRequest& request, const BootHeads& heads,
@@ -44,23 +52,20 @@ Result<Marker> insert(SQLite::Database& database, const MarkerRequest& request, 
   return marker;
 }
 
-// Of rows marker_id, boot_key, boot_id, seq, text, actor, made_at_us.
-std::vector<Marker> read_markers(SQLite::Database& database, SQLite::Statement& rows) {
-  std::vector<Marker> markers;
-  while (rows.executeStep()) {
-    Marker& marker = markers.emplace_back();
-    marker.id = rows.getColumn(0).getInt64();
-    marker.boot_id = unsigned_id(rows.getColumn(2));
-    marker.seq = unsigned_id(rows.getColumn(3));
-    marker.text = rows.getColumn(4).getString();
-    marker.actor = rows.getColumn(5).getString();
-    marker.made_at_us = rows.getColumn(6).getInt64();
-    const auto time = time_of(database, rows.getColumn(1).getInt64(), marker.seq);
-    if (!time) continue;
+// Of a row marker_id, boot_key, boot_id, seq, text, actor, made_at_us.
+Marker marker_from(SQLite::Database& database, SQLite::Statement& row) {
+  Marker marker;
+  marker.id = row.getColumn(0).getInt64();
+  marker.boot_id = unsigned_id(row.getColumn(2));
+  marker.seq = unsigned_id(row.getColumn(3));
+  marker.text = row.getColumn(4).getString();
+  marker.actor = row.getColumn(5).getString();
+  marker.made_at_us = row.getColumn(6).getInt64();
+  if (const auto time = time_of(database, row.getColumn(1).getInt64(), marker.seq)) {
     marker.robot_time_us = time->robot_time_us;
     marker.utc_us = time->utc_us;
   }
-  return markers;
+  return marker;
 }
 
 }  // namespace
@@ -88,28 +93,41 @@ asio::awaitable<Result<Marker>> Markers::add(MarkerRequest request) {
 
 asio::awaitable<std::vector<Marker>> Markers::of_robot(station::RobotId robot_id, std::int64_t after,
                                                        std::size_t limit) {
-  auto query = [robot_id, after, count = std::clamp<std::size_t>(limit, 1, kMaxListed)](SQLite::Database& database) {
+  auto query = [robot_id, after, limit](SQLite::Database& database) {
     const SQLite::Transaction moment{database};
     SQLite::Statement rows{database,
                            "SELECT marker_id, boot_key, boot_id, seq, text, actor, made_at_us"
                            " FROM marker JOIN boot USING (boot_key)"
                            " WHERE robot_id = ? AND marker_id > ? ORDER BY marker_id LIMIT ?"};
-    bind_all(rows, robot_id, after, static_cast<std::int64_t>(count));
-    return read_markers(database, rows);
+    bind_all(rows, robot_id, after, static_cast<std::int64_t>(limit));
+    std::vector<Marker> markers;
+    while (rows.executeStep()) markers.push_back(marker_from(database, rows));
+    return markers;
   };
   co_return co_await reader_.ask(std::move(query));
 }
 
-asio::awaitable<Result<std::vector<Marker>>> Markers::of_run(RunId run) {
-  auto query = [run](SQLite::Database& database) -> Result<std::vector<Marker>> {
+asio::awaitable<Result<MarkerPage>> Markers::of_run(RunId run, std::optional<MarkerCursor> after, std::size_t limit) {
+  auto query = [run, after, limit](SQLite::Database& database) -> Result<MarkerPage> {
     const SQLite::Transaction moment{database};
     if (!read_run_state(database, run)) return fail(ErrorCode::not_found, fmt::format("there is no run {}", run));
     SQLite::Statement rows{database,
                            "SELECT marker_id, boot_key, boot.boot_id, marker.seq, marker.text, marker.actor,"
-                           " marker.made_at_us FROM run_marker JOIN marker USING (marker_id) JOIN boot USING (boot_key)"
-                           " WHERE run_id = ? ORDER BY span, marker.seq, marker_id"};
-    bind_all(rows, run);
-    return read_markers(database, rows);
+                           " marker.made_at_us, span"
+                           " FROM run_marker JOIN marker USING (marker_id) JOIN boot USING (boot_key)"
+                           " WHERE run_id = ?1 AND (?2 IS NULL OR (span, marker.seq, marker_id) > (?2, ?3, ?4))"
+                           " ORDER BY span, marker.seq, marker_id LIMIT ?5"};
+    const MarkerCursor from = after.value_or(MarkerCursor{});
+    bind_all(rows, run, after ? std::optional<std::int64_t>{from.span} : std::nullopt, from.seq, from.id,
+             static_cast<std::int64_t>(limit) + 1);
+    MarkerPage page;
+    while (rows.executeStep()) {
+      if (page.markers.size() == limit) return page;
+      const Marker& marker = page.markers.emplace_back(marker_from(database, rows));
+      page.next = {rows.getColumn(7).getUInt(), marker.seq, marker.id};
+    }
+    page.next.reset();
+    return page;
   };
   co_return co_await reader_.ask(std::move(query));
 }

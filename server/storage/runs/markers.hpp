@@ -37,20 +37,33 @@ struct MarkerRequest {
   station::BootId boot_id = 0;  // of the robot's present connection, 0 when there is none: its newest sample is now
 };
 
+// The place of a marker in a run.
+struct MarkerCursor {
+  std::uint32_t span = 0;
+  std::uint64_t seq = 0;
+  std::int64_t id = 0;
+};
+
+struct MarkerPage {
+  std::vector<Marker> markers;
+  std::optional<MarkerCursor> next;  // of the last one of the page; empty: the end
+};
+
 class Markers {
  public:
   Markers(runtime::Clock& clock, Recorder& recorder, DatabaseReader& reader)
       : clock_{clock}, recorder_{recorder}, reader_{reader} {}
 
-  // not_connected for a marker now of a robot that is not there; invalid for a time that is in the future or has no
-  // sample, or for a bad text.
+  // A marker now is at the robot's newest sample, or where a run of it begins with the next one, at that one: what is
+  // marked in a run belongs to it. not_connected for a marker now of a robot that is not there; invalid for a time that
+  // is in the future or has no sample, or for a bad text.
   boost::asio::awaitable<Result<Marker>> add(MarkerRequest request);
 
-  // In the order in which they were made, at most `limit` (1 to 1000) after the marker `after` (0: from the first).
+  // In the order in which they were made, at most `limit` after the marker `after` (0: from the first).
   boost::asio::awaitable<std::vector<Marker>> of_robot(station::RobotId robot_id, std::int64_t after,
                                                        std::size_t limit);
-  // In order of span and seq.
-  boost::asio::awaitable<Result<std::vector<Marker>>> of_run(RunId run);
+  // In order of span and seq, at most `limit` after the cursor.
+  boost::asio::awaitable<Result<MarkerPage>> of_run(RunId run, std::optional<MarkerCursor> after, std::size_t limit);
 
  private:
   runtime::Clock& clock_;

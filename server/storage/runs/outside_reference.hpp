@@ -50,6 +50,11 @@ struct OutsidePositions {
   std::vector<double> position_m, position_sd_m;
 
   std::size_t size() const { return robot_time_us.size(); }
+  void resize(std::size_t size) {
+    robot_time_us.resize(size);
+    position_m.resize(size);
+    position_sd_m.resize(size);
+  }
 };
 
 struct StoredReference {

@@ -20,7 +20,7 @@ namespace {
 
 constexpr std::size_t kMaxNameBytes = 200;
 constexpr std::size_t kMaxTextBytes = 10'000;
-constexpr std::size_t kMaxListed = 1000;
+constexpr std::size_t kMaxListed = 1001;  // a page, and one more that shows whether there are others
 constexpr microseconds kEndPatience = 3s;
 constexpr microseconds kEndLook = 50ms;
 constexpr microseconds kLoadInterval = 1s;

@@ -21,7 +21,7 @@ struct Segment {
   station::SampleContext context;
   std::vector<station::Sample> samples;
   std::int64_t first_received_at_us = 0;  // UTC, when the first of them had arrived
-  std::int64_t received_at_us = 0;        // UTC, when the last of them had arrived
+  std::int64_t received_at_us = 0;        // UTC, when the last of them had arrived; 0: others may still follow it
   std::int64_t utc_offset_us = 0;
   std::int64_t clock_uncertainty_us = -1;
 

@@ -68,8 +68,8 @@ station::CommandRecord command_from(SQLite::Statement& row) {
 std::string select_events(const char* condition) {
   return fmt::format(
       "SELECT event.robot_id, boot.boot_id, event_seq, robot_time_us, sample_seq, kind, cause, mode, sub_state,"
-      " position_m, value, emergency_id, command_id, received_at_us, emergency_cause, detail, event.unknown_values "
-      "FROM event LEFT JOIN boot "
+      " position_m, value, emergency_id, command_id, received_at_us, emergency_cause, detail, event.unknown_values, "
+      "event_row FROM event LEFT JOIN boot "
       "USING (boot_key) {}",
       condition);
 }

@@ -40,8 +40,10 @@ void set_unknown(station::SampleContext& context, const std::string& unknown_val
 std::string select_commands(const char* condition);
 std::string select_events(const char* condition);
 station::CommandRecord command_from(SQLite::Statement& row);
-inline constexpr int kCommandAuditEntry = 18;  // its column; NULL: older than the audit
 station::RobotEvent event_from(SQLite::Statement& row);
+// Columns of them. An audit entry is NULL where the command is older than the audit.
+inline constexpr int kCommandId = 0, kCommandSubmittedAt = 8, kCommandAuditEntry = 18;
+inline constexpr int kEventReceivedAt = 13, kEventRow = 17;
 
 // Emergency stops that no robot has acknowledged, oldest first.
 std::vector<station::CommandRecord> pending_stops(Database& database);

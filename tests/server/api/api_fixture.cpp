@@ -90,6 +90,9 @@ TestRobot& ApiTest::connect_robot() {
 
 asio::awaitable<void> ApiTest::answer(http::Request request, std::shared_ptr<std::optional<Answered>> into) {
   Answered answered;
+  answered.method = request.method;
+  const http::Route* route = api->router().find(request.method, request.target);
+  if (route != nullptr) answered.pattern = route->pattern;
   answered.response = co_await api->router().dispatch(std::move(request));
   answered.status = answered.response.status;
   answered.body = answered.response.body;
@@ -119,7 +122,9 @@ std::shared_ptr<std::optional<Answered>> ApiTest::begin(const std::string& metho
 
 Answered ApiTest::end(const std::shared_ptr<std::optional<Answered>>& asked, microseconds limit) {
   EXPECT_TRUE(clock.run_until([&] { return asked->has_value(); }, limit));
-  return asked->has_value() ? std::move(**asked) : Answered{};
+  if (!asked->has_value()) return {};
+  if (check_answer != nullptr && !(*asked)->pattern.empty()) check_answer(**asked);
+  return std::move(**asked);
 }
 
 Answered ApiTest::ask(const std::string& method, const std::string& target, const json& body) {

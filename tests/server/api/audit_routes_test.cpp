@@ -177,7 +177,7 @@ TEST_F(AuditRoutesTest, PagesGoBackToTheFirstEntryAndTellTheHead) {
     for (const json& entry : page["entries"]) entries.push_back(entry["entry"]);
     const std::string head = page["head"];
     EXPECT_TRUE(head.starts_with(std::to_string(entries.front()) + ":")) << head;
-    next = page["next_before"].is_null() ? "" : "?limit=2&before=" + page["next_before"].dump();
+    next = page["next"].is_null() ? "" : "?limit=2&before=" + page["next"].dump();
   }
   EXPECT_EQ(entries.back(), 1);
   EXPECT_TRUE(std::ranges::is_sorted(entries, std::greater{}));

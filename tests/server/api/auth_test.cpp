@@ -279,6 +279,41 @@ TEST_F(RequestGuardTest, EverythingWithDataNeedsACredential) {
   }
 }
 
+TEST_F(RequestGuardTest, AWrongTokenIsToldFromNone) {
+  const auto reason = [this](const http::Request& asked) {
+    return nlohmann::json::parse(guard.admit(asked).error().body)["reason"].get<std::string>();
+  };
+  const auto challenge = [this](const http::Request& asked) {
+    const http::Response refused = guard.admit(asked).error();
+    for (const auto& [name, value] : refused.headers) {
+      if (name == "WWW-Authenticate") return value;
+    }
+    return std::string{};
+  };
+  http::Request asked = request("GET", "/api/v1/robots");
+  EXPECT_EQ(reason(asked), "no_credential");
+  EXPECT_EQ(challenge(asked), "Bearer");
+  asked.headers["authorization"] = "Basic abc";
+  EXPECT_EQ(reason(asked), "no_credential");
+  asked.headers["authorization"] = "Bearer wrong";
+  EXPECT_EQ(reason(asked), "wrong_token");
+  EXPECT_EQ(challenge(asked), R"(Bearer error="invalid_token")");
+  http::Request with_both = with_cookie("GET", "/api/v1/robots");
+  with_both.headers["authorization"] = "Bearer wrong";
+  EXPECT_EQ(reason(with_both), "wrong_token") << "a cookie does not make it good";
+  http::Request of_ended = request("GET", "/api/v1/robots");
+  of_ended.headers["cookie"] = "rheonaut_session_fedcba9876543210=ended";
+  EXPECT_EQ(reason(of_ended), "no_credential");
+}
+
+TEST_F(RequestGuardTest, NoRoleHelpsARequestOfAnotherOrigin) {
+  http::Request post = with_cookie("POST", "/api/v1/emergency-stop");
+  post.headers["origin"] = "http://evil.example";
+  const auto problem = nlohmann::json::parse(guard.admit(post).error().body);
+  EXPECT_EQ(problem["reason"], "wrong_origin");
+  EXPECT_TRUE(problem.at("needs").is_null());
+}
+
 TEST_F(RequestGuardTest, AnswersOnlyToItsOwnNames) {
   http::Request asked = with_token("GET", "/api/v1/robots");
   for (const char* host : {"localhost", "LOCALHOST:1", "127.0.0.1:8080", "127.9.9.9", "[::1]:8080", "station.lab:8080",

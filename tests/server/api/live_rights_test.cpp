@@ -45,6 +45,7 @@ TEST_F(LiveRightsTest, AViewerSeesAndStopsAndRenewsNothing) {
   page->say({{"type", "renew_lease"}, {"robot_id", "r1"}, {"stamp_us", clock.steady_us()}});
   const json problem = page->receive("problem");
   EXPECT_EQ(problem["problem"]["reason"], "not_permitted") << problem;
+  EXPECT_EQ(problem["problem"]["needs"], "operator");
   page->say({{"type", "take_over_the_world"}});
   EXPECT_EQ(page->receive("problem")["problem"]["reason"], "not_permitted") << "what is not known needs a commander";
   page->say({{"type", "keep_alive"}});
@@ -57,7 +58,9 @@ TEST_F(LiveRightsTest, ATokenThatMayOnlyReadNeitherStopsNorCommands) {
   const auto page = open(make_token("logger", "read"));
   ASSERT_TRUE(page->open()) << page->answer;
   page->say({{"type", "emergency_stop"}, {"robot_id", "r1"}});
-  EXPECT_EQ(page->receive("problem")["problem"]["reason"], "not_permitted");
+  const json problem = page->receive("problem")["problem"];
+  EXPECT_EQ(problem["reason"], "not_permitted");
+  EXPECT_EQ(problem["needs"], "viewer") << "which may stop; this token may not";
   EXPECT_EQ(stops(), 0U);
 }
 

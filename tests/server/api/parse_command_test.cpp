@@ -160,5 +160,20 @@ TEST(StateJson, ReplacesBytesThatAreNotText) {
   EXPECT_EQ(nlohmann::json::parse(base::dump(live::to_json(robot)))["firmware_version"], "1.0\xef\xbf\xbd");
 }
 
+// As JSON Schema has it, by which the document says what an integer is.
+TEST(ParseCommand, AnIntegerMayBeWrittenWithAPoint) {
+  const auto life = [](const char* number) {
+    return api::parse_command(std::string{R"({"kind":"ping","life_ms":)"} + number + "}");
+  };
+  for (const char* number : {"2000", "2000.0", "2e3", "20000e-1"}) {
+    ASSERT_TRUE(life(number)) << number;
+    EXPECT_EQ(life(number)->time_to_live, 2s) << number;
+  }
+  EXPECT_EQ(life("2000.5").error().reason, "wrong_type");
+  for (const char* number : {"1e300", "-1e300", "1e19", "9007199254740994.0", "0.0", "18446744073709551615"}) {
+    EXPECT_EQ(life(number).error().reason, "out_of_range") << number;
+  }
+}
+
 }  // namespace
 }  // namespace server

@@ -41,7 +41,7 @@ TEST(QueryParams, AWindowHasItsEndAboveItsBeginning) {
 
 TEST(QueryParams, ACursorIsOneThatAPageGave) {
   EXPECT_FALSE(api::query_cursor(with({})).value().has_value());
-  EXPECT_EQ(api::query_cursor(with({{"after", api::cursor_text({3, 99})}})).value()->seq, 99u);
+  EXPECT_EQ(api::query_cursor(with({{"after", api::cursor_text(storage::SampleCursor{3, 99})}})).value()->seq, 99u);
   for (const char* text : {"", "3", "3-", "-3", "3-4-", "3-99999999999999999999", "3-18446744073709551615"}) {
     EXPECT_EQ(api::query_cursor(with({{"after", text}})).error().code, ErrorCode::bad_request) << text;
   }

@@ -75,6 +75,50 @@ TEST_F(RightsTest, AViewerChangesNothingButMayStop) {
   EXPECT_EQ(of_admins.size(), 17U);
 }
 
+// Where the body, or whose it is, decides. (The fixture sees that no 403 is without `needs`.)
+TEST_F(RightsTest, ARefusalSaysWhichRoleWouldDoIt) {
+  connect_robot();
+  make_samples(*robot, 0, 25);
+  ask("POST", "/api/v1/runs", {{"robot_id", "r1"}, {"name", "first"}});
+  ask("POST", "/api/v1/jobs", {{"kind", "report"}, {"runs", {1}}});
+  ask("POST", "/api/v1/robots/r1/reservations", {{"for_s", 60}, {"from_us", clock.utc_us() + 3'600'000'000}});
+  const auto needs = [this](const std::string& target, const json& body) {
+    const Answered refused = ask("POST", "/api/v1" + target, body);
+    EXPECT_EQ(refused.status, 403) << target << refused.body;
+    return refused.parsed().value("needs", json("none"));
+  };
+  actor = "token:other";
+  scopes = identity::Scopes::of(identity::Role::operator_);
+  EXPECT_EQ(needs("/robots/r1/control", {{"action", "force"}, {"reason", "lunch"}}), "admin");
+  EXPECT_EQ(needs("/robots/r1/commands",
+                  {{"kind", "set_parameter"}, {"name", "position_limit_max_m"}, {"value", 0.2}, {"confirm", true}}),
+            "admin");
+  EXPECT_EQ(needs("/jobs/1/cancel", nullptr), "admin");
+  EXPECT_EQ(needs("/reservations/1/cancel", nullptr), "admin");
+  EXPECT_EQ(needs("/robots/r1/reservations", {{"for_s", 60}, {"holder", "token:local"}}), "admin");
+  const json unattended{{"robot_id", "r1"}, {"profile", "figure_7"}, {"unattended", true}};
+  EXPECT_EQ(needs("/experiments", unattended), nullptr) << "the configuration forbids it, to everybody";
+  scopes = identity::parse_scopes("record").value();
+  EXPECT_EQ(needs("/runs", {{"robot_id", "r1"}, {"name", "wet"}, {"fluid", "water"}}), "operator");
+  EXPECT_EQ(needs("/runs/1/annotate", {{"fluid", "water"}}), "operator");
+  standing->end();
+  scopes = identity::Scopes::of(identity::Role::admin);
+  EXPECT_EQ(needs("/robots/r1/commands", {{"kind", "ping"}}), nullptr) << "it was revoked";
+}
+
+// It moves nothing: who may command at all may ask whether the robot is there, whoever controls it.
+TEST_F(RightsTest, APingNeedsTheScopeCommandAndNoControl) {
+  connect_robot();
+  ASSERT_TRUE(station.control({"r1", "user:anna/session:4", "", station::ControlAction::take, 60s, ""}));
+  scopes = identity::Scopes::of(identity::Role::viewer);
+  EXPECT_EQ(ask("POST", "/api/v1/robots/r1/commands", {{"kind", "ping"}}).parsed()["needs"], "operator");
+  scopes = identity::Scopes::of(identity::Role::operator_);
+  const auto asked = begin("POST", "/api/v1/robots/r1/commands", {{"kind", "ping"}});
+  robot->acknowledge(robot->commands().back(), rheonaut_COMMAND_RESULT_ACCEPTED);
+  EXPECT_EQ(end(asked).status, 200);
+  EXPECT_EQ(station.holder("r1"), "user:anna/session:4");
+}
+
 TEST_F(RightsTest, OnlyAnAdminChangesWhatBoundsTheMotionOfARobot) {
   connect_robot();
   const auto set = [this](const char* name, json confirm) {

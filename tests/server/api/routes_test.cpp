@@ -230,6 +230,38 @@ TEST_F(RoutesTest, ARunHoldsWhatWasMadeBetweenItsBeginAndItsEnd) {
   EXPECT_EQ(ask("GET", path + "/gaps?after=x").status, 400);
 }
 
+// While a segment waits for more samples, when it is complete, and when it is on disk.
+TEST_F(RoutesTest, WhenASampleWasReceivedNeverChanges) {
+  connect_robot();
+  std::map<std::uint64_t, std::pair<json, json>> known;
+  std::size_t unknown = 0;
+  const auto read = [&] {
+    unknown = 0;
+    const json page = ask("GET", "/api/v1/robots/r1/samples?limit=10000").parsed();
+    for (const json& sample : page["samples"]) {
+      EXPECT_FALSE(sample["first_received_at_us"].is_null());
+      const std::pair<json, json> received{sample["first_received_at_us"], sample["received_at_us"]};
+      const auto seq = sample["seq"].get<std::uint64_t>();
+      unknown += received.second.is_null() ? 1 : 0;
+      const auto [at, is_new] = known.emplace(seq, received);
+      if (is_new) continue;
+      EXPECT_EQ(at->second.first, received.first) << seq;
+      if (at->second.second.is_null()) at->second.second = received.second;
+      EXPECT_EQ(at->second.second, received.second) << seq;
+    }
+  };
+  for (std::uint64_t seq = 0; seq < 250; seq += 5) {
+    make_samples(*robot, seq, 5);
+    clock.run_for(50ms);
+    read();
+    EXPECT_LE(unknown, 100U) << "more than the last segment";
+  }
+  EXPECT_GT(known.size(), unknown);
+  clock.run_for(3s);
+  read();
+  EXPECT_EQ(unknown, 0U);
+}
+
 TEST_F(RoutesTest, ARunInManualHasNoSteps) {
   connect_robot();
   ask("POST", "/api/v1/runs", {{"robot_id", "r1"}, {"name", "manual"}});
@@ -311,6 +343,7 @@ TEST_F(RoutesTest, BadRunRequestsAreRefused) {
   EXPECT_EQ(ask("GET", "/api/v1/runs?limit=0").status, 400);
   EXPECT_EQ(ask("GET", "/api/v1/runs?limit=1001").status, 400);
   EXPECT_EQ(ask("GET", "/api/v1/runs/1/samples?after=x").status, 400);
+  EXPECT_EQ(ask("GET", "/api/v1/runs/99").parsed()["reason"], "not_found") << "no reason of its own";
   EXPECT_EQ(ask("GET", "/api/v1/commands/0").status, 400);
   EXPECT_EQ(ask("GET", "/api/v1/commands/5").status, 404);
 }

@@ -1,4 +1,6 @@
 // Runs after their end, and markers, through the routes: digest, annotation, discard, runs made afterwards.
+#include <fmt/format.h>
+
 #include "tests/server/api/api_fixture.hpp"
 
 namespace server {
@@ -104,6 +106,33 @@ TEST_F(RunRoutesTest, MarkersAreListedByRobotAndByRun) {
   EXPECT_EQ(ask("POST", "/api/v1/robots/r9/markers", {{"text", "x"}}).status, 404);
   EXPECT_EQ(ask("GET", "/api/v1/robots/r9/markers").status, 404);
   EXPECT_EQ(ask("GET", "/api/v1/runs/99/markers").status, 404);
+}
+
+// Before the robot's next sample, with which the run begins, has come; the robot may have made none so far.
+TEST_F(RunRoutesTest, AMarkerRightAfterARunBeganIsInTheRun) {
+  connect_robot();
+  const auto marked_run = [this] {
+    const json run = ask("POST", "/api/v1/runs", {{"robot_id", "r1"}, {"name", "marked"}}).parsed();
+    const Answered marked = ask("POST", "/api/v1/robots/r1/markers", {{"text", "begins"}});
+    EXPECT_EQ(marked.status, 201) << marked.body;
+    EXPECT_EQ(marked.parsed()["seq"], run["spans"][0]["first_seq"]);
+    const std::string path = fmt::format("/api/v1/runs/{}", run["run_id"].get<int>());
+    const json listed = ask("GET", path + "/markers").parsed()["markers"];
+    EXPECT_EQ(listed.size(), 1U) << path;
+    return path;
+  };
+  const std::string first = marked_run();
+  make_samples(*robot, 0, 10);
+  EXPECT_EQ(ask("POST", "/api/v1/robots/r1/markers", {{"text", "later"}}).parsed()["seq"], 9);
+  EXPECT_EQ(ask("POST", first + "/end").status, 200);
+  EXPECT_EQ(ask("POST", "/api/v1/robots/r1/markers", {{"text", "no run is open"}}).parsed()["seq"], 9);
+  const std::string second = marked_run();
+  make_samples(*robot, 10, 10);
+  EXPECT_EQ(ask("POST", second + "/end").status, 200);
+  const json marker = ask("GET", second + "/markers").parsed()["markers"].at(0);
+  const json sample = ask("GET", second + "/samples?limit=1").parsed()["samples"].at(0);
+  EXPECT_EQ(marker["seq"], sample["seq"]);
+  EXPECT_EQ(marker["robot_time_us"], sample["robot_time_us"]);
 }
 
 TEST_F(RunRoutesTest, TheSnapshotHoldsTheStationsConfiguration) {

@@ -366,7 +366,7 @@ TEST_F(ToolTest, AutotuneRefusesBadOptions) {
   EXPECT_THAT(said("--robot sim-1 --crossover-rad-s 3 --phase-margin-deg 90 --run 1 --profile figure_5"),
               HasSubstr("excludes"));
   EXPECT_THAT(said("--robot sim-1 --crossover-rad-s 3 --phase-margin-deg 90 --data @none"),
-              HasSubstr("cannot read the station's token"));
+              HasSubstr("there is no folder"));
 }
 
 }  // namespace

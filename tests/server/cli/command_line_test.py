@@ -88,7 +88,7 @@ class CommandLineTest(unittest.TestCase):
         self.assertEqual(without, WITHOUT_JSON)
         with tempfile.TemporaryDirectory() as folder:
             copy, restored = f"{folder}/copy.sqlite", f"{folder}/restored"
-            for words in (["token", "create", "a"], ["token", "revoke", "a"], ["robot", "enroll", "r"],
+            for words in (["token", "create", "a"], ["token", "revoke", "a"], ["robot", "enrol", "r"],
                           ["robot", "retire", "r"], ["robot", "list"], ["user", "list"], ["bode"], ["profile"],
                           ["check-config"], ["certificate"], ["backup", "--to", copy],
                           ["restore", "--from", copy, "--data", restored]):

@@ -78,7 +78,7 @@ class DocumentedCommands(unittest.TestCase):
 
     def test_examples_of_account_tools_work(self):
         with tempfile.TemporaryDirectory() as folder:
-            for command in ("user add", "token create", "robot enroll", "user", "token", "robot"):
+            for command in ("user add", "token create", "robot enrol", "user", "token", "robot"):
                 with self.subTest(command=command):
                     shown = run(f"rheonaut {command} --help", folder).stdout
                     example = re.search(r"^Example: (rheonaut .*)$", shown, re.M).group(1)

@@ -39,6 +39,28 @@ TEST_F(LinkTest, TheEndOfACommandWithoutAnswerIsUnknown) {
   EXPECT_EQ(results[0]->reason, "no_answer");
 }
 
+// Whatever the robot says or does not say, and whatever is waited for.
+TEST_F(LinkTest, ThatNoAnswerCameIsSaidWithin100MsOfTheEndOfItsLife) {
+  for (const bool is_silent : {false, true}) {
+    for (const bool until_verified : {false, true}) {
+      results.clear();
+      auto* robot = is_silent ? dial() : connect();
+      if (is_silent) robot->say_hello();
+      ASSERT_TRUE(clock.run_until([&] { return !robot->welcomes().empty(); }, 1s));
+      auto request = request_of(set_duty(0.3F), 500ms);
+      request.until_verified = until_verified;
+      const std::int64_t asked_at_us = clock.steady_us();
+      submit(std::move(request));
+      ASSERT_TRUE(clock.run_until([&] { return !results.empty(); }, 3s));
+      EXPECT_EQ(results[0]->state, station::CommandState::unknown);
+      EXPECT_EQ(results[0]->reason, "no_answer");
+      const std::int64_t after_us = clock.steady_us() - asked_at_us;
+      EXPECT_GE(after_us, 500'000) << is_silent << until_verified;
+      EXPECT_LE(after_us, 600'000) << is_silent << until_verified;
+    }
+  }
+}
+
 TEST_F(LinkTest, ACommandThatWaitedLongerThanItsLifeIsNeverSent) {
   auto* robot = dial(64);
   robot->say_hello();

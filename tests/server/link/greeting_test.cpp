@@ -59,6 +59,16 @@ TEST(Greeting, NumbersThatCannotBeAreMalformed) {
   EXPECT_EQ(reason_for(hello(), station::kMaxRobotNumber + 1), rheonaut_REFUSAL_REASON_MALFORMED);
 }
 
+TEST(Greeting, AHelloIsFoundInAFrameWhateverItSays) {
+  const auto has_hello = [](std::vector<std::uint8_t> bytes) { return link::has_hello({bytes.data(), bytes.size()}); };
+  EXPECT_TRUE(has_hello({0x08, 1, 0x12, 2, 0xFF, 0xFF})) << "robot_time_us 1, then a hello";
+  EXPECT_FALSE(has_hello({})) << "nothing";
+  EXPECT_FALSE(has_hello({0x08, 1, 0x1A, 0})) << "a heartbeat";
+  EXPECT_FALSE(has_hello({0x10, 1})) << "a number under its tag";
+  EXPECT_FALSE(has_hello({'G', 'E', 'T', ' ', '/'})) << "another protocol";
+  EXPECT_FALSE(has_hello({0x1A, 9, 0x12, 0})) << "a body that ends before its length";
+}
+
 TEST(Greeting, NamesHaveTheirCharacters) {
   for (const char* name : {"", "R1", "r 1", "r/1"}) {
     auto bad = hello();

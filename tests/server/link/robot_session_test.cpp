@@ -94,6 +94,18 @@ TEST_F(LinkTest, RefusesAMalformedHello) {
   }
 }
 
+TEST_F(LinkTest, RefusesAHelloWithATextThatIsTooLong) {
+  std::vector<std::uint8_t> bytes{36, 0x12, 34, 0x12, 32};  // hello of 34 bytes: robot_id of 32
+  bytes.insert(bytes.end(), 32, 'r');
+  auto* robot = dial();
+  robot->send_bytes(bytes);
+  ASSERT_TRUE(clock.run_until([&] { return robot->closed; }, 1s));
+  ASSERT_EQ(robot->welcomes().size(), 1u);
+  EXPECT_EQ(robot->welcomes()[0].refusal, rheonaut_REFUSAL_REASON_MALFORMED);
+  EXPECT_NE(std::string{robot->welcomes()[0].detail}.find("robot_id has at most 31"), std::string::npos);
+  EXPECT_TRUE(archive.requests.empty());
+}
+
 TEST_F(LinkTest, ClosesOnGarbageOversizeAndAnythingButHello) {
   auto* garbage = dial();
   garbage->send_bytes({5, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF});

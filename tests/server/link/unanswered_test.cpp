@@ -123,7 +123,7 @@ TEST_F(UnansweredTest, SamplesThatNothingElseExplainsSettleIt) {
   auto* robot = connect();
   show_duty(*robot, 0);
   const station::CommandId later = unanswered(set_duty(0.3F));
-  show_duty(*robot, 0.3F, 1s);
+  show_duty(*robot, 0.3F, 400ms);
   EXPECT_EQ(latest(later).state, station::CommandState::verified);
   EXPECT_EQ(latest(later).reason, "no_answer");
 
@@ -151,7 +151,8 @@ TEST_F(UnansweredTest, SamplesOfALaterTimeOrOfAnotherModeProveNothing) {
   auto* robot = connect();
   show_duty(*robot, 0);
   const station::CommandId id = unanswered(set_duty(0.3F));
-  show_duty(*robot, 0.3F, 1s, rheonaut_MODE_AUTO);
+  show_duty(*robot, 0.3F, 400ms, rheonaut_MODE_AUTO);
+  clock.run_for(1s);
   show_duty(*robot, 0.3F, 100ms);
   clock.run_for(20s);
   show_duty(*robot, 0.3F);

@@ -353,7 +353,7 @@ TEST_F(AdmissionTest, OnlySoManyRobotsEnrolThemselvesAtAll) {
   const station::Admission refused = admit(numbered(65));
   EXPECT_EQ(refused.refusal, rheonaut_REFUSAL_REASON_UNKNOWN_ROBOT);
   EXPECT_TRUE(refused.enrolment_full);
-  EXPECT_THAT(refused.detail, HasSubstr("only 64 robots of this machine enrol themselves: rheonaut robot enroll r65"));
+  EXPECT_THAT(refused.detail, HasSubstr("only 64 robots of this machine enrol themselves: rheonaut robot enrol r65"));
   EXPECT_EQ(number("SELECT count(*) FROM robot"), 64);
   const auto with_store = [this](auto change) {
     auto job = [change](storage::Database& database) {

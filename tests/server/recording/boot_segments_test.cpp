@@ -37,6 +37,7 @@ class BootSegmentsTest : public ::testing::Test {
     batch.first_seq = first_seq;
     batch.first_robot_time_us = first_seq * 10'000;
     batch.context.period_us = 10'000;
+    batch.received_at_us = static_cast<std::int64_t>(first_seq) + 1'000;
     batch.samples.resize(samples);
     for (station::Sample& sample : batch.samples) sample.position_m = position_m;
     boot.recording.append(batch, 0);
@@ -122,6 +123,28 @@ TEST_F(BootSegmentsTest, AReaderFindsSamplesAsTheDatabaseWillGiveThemBack) {
   ASSERT_EQ(segments.size(), 1U);
   EXPECT_FALSE(std::signbit(segments[0].samples.at(0).position_m));
   EXPECT_TRUE(std::isnan(segments[0].samples.at(1).position_m));
+}
+
+TEST_F(BootSegmentsTest, WhenASegmentHadArrivedIsKnownOnceNothingCanFollowInIt) {
+  const auto times = [this] {
+    std::vector<std::int64_t> found;
+    for (const storage::Segment& segment : waiting_samples(queue_, nemo_, kAllSamples, kNoLimit)) {
+      EXPECT_EQ(segment.first_received_at_us, static_cast<std::int64_t>(segment.first_seq) + 1'000);
+      found.push_back(segment.received_at_us);
+    }
+    return found;
+  };
+  receive(nemo_, 0, 5);
+  EXPECT_THAT(times(), ElementsAre(0)) << "5 may follow";
+  receive(nemo_, 10, 5);
+  EXPECT_THAT(times(), ElementsAre(0, 0)) << "what is missing may still come";
+  receive(nemo_, 5, 5);
+  EXPECT_THAT(times(), ElementsAre(1'005, 0)) << "10 is there already";
+  receive(nemo_, 15, 85);
+  EXPECT_THAT(times(), ElementsAre(1'005, 1'015)) << "the second is complete";
+  receive(nemo_, 100, 1);
+  enqueue_everything(boots_, queue_);
+  EXPECT_THAT(times(), ElementsAre(1'005, 1'015, 1'100)) << "what is in the commit stays as it is";
 }
 
 TEST_F(BootSegmentsTest, AReaderFindsGapsWhereverTheyWait) {

@@ -49,7 +49,7 @@ TEST_F(HistoryTest, GivesBackEveryValueOfASample) {
     EXPECT_EQ(stored.utc_us, 1'700'000'000'510'000);
     EXPECT_EQ(stored.clock_uncertainty_us, 300);
     EXPECT_EQ(stored.first_received_at_us, received_at_us);
-    EXPECT_EQ(stored.received_at_us, received_at_us);
+    EXPECT_EQ(stored.received_at_us, on_disk > 0 ? received_at_us : 0) << "others may follow in its segment";
     EXPECT_EQ(stored.sample, (station::Sample{1, 2, 3, -0.5, 175, 0.1F}));
     EXPECT_EQ(stored.mode, rheonaut_MODE_AUTO);
     EXPECT_EQ(stored.sub_state, rheonaut_SUB_STATE_NAVIGATING);
@@ -175,8 +175,8 @@ TEST_F(HistoryTest, QueriesOfEventsAndCommandsCutNoSegmentShort) {
     event.robot_id = robot_.id;
     event.kind = "event " + std::to_string(n);
     recorder_->on_event(state_of(robot_, station::LinkState::connected), event);
-    EXPECT_EQ(wait(history_->events(robot_.id, {.limit = 1})).at(0).kind, event.kind);
-    EXPECT_EQ(wait(history_->commands(robot_.id, {.limit = 1})).size(), 0u);
+    EXPECT_EQ(wait(history_->events(robot_.id, {.limit = 1})).records.at(0).kind, event.kind);
+    EXPECT_EQ(wait(history_->commands(robot_.id, {.limit = 1})).records.size(), 0u);
     clock_.run_for(1ms);
   }
   clock_.run_for(2s);
@@ -232,7 +232,7 @@ TEST_F(HistoryTest, GivesBackEventsAndCommandsNewestFirst) {
     command.submitted_at_us = static_cast<std::int64_t>(n);
     recorder_->on_command(command);
   }
-  const std::vector<station::RobotEvent> events = wait(history_->events(robot_.id, {.limit = 10}));
+  const std::vector<station::RobotEvent> events = wait(history_->events(robot_.id, {.limit = 10})).records;
   ASSERT_EQ(events.size(), 3u);
   EXPECT_EQ(events[0].kind, "event 2");
   EXPECT_EQ(events[0].boot_id, robot_.boot_id);
@@ -241,8 +241,8 @@ TEST_F(HistoryTest, GivesBackEventsAndCommandsNewestFirst) {
   EXPECT_EQ(events[0].emergency_id, 0xf000000000000001);
   EXPECT_EQ(events[2].boot_id, 0u);
   EXPECT_FALSE(events[2].event_seq.has_value());
-  EXPECT_EQ(wait(history_->events(robot_.id, {.limit = 2})).size(), 2u);
-  const std::vector<station::CommandRecord> commands = wait(history_->commands(robot_.id, {.limit = 2}));
+  EXPECT_EQ(wait(history_->events(robot_.id, {.limit = 2})).records.size(), 2u);
+  const std::vector<station::CommandRecord> commands = wait(history_->commands(robot_.id, {.limit = 2})).records;
   ASSERT_EQ(commands.size(), 2u);
   EXPECT_EQ(commands[0].id, 0xf000000000000002);
   EXPECT_EQ(wait(history_->command(0xf000000000000001))->state, station::CommandState::acknowledged);
@@ -265,12 +265,12 @@ TEST_F(HistoryTest, EventsAndCommandsOfAWindowOfTimeAndCommandsWithoutRenewals) 
     recorder_->on_command(command);
   }
   const storage::TimeWindow window{2'000'000, 4'000'000};  // without its end
-  const std::vector<station::RobotEvent> events = wait(history_->events(robot_.id, {.window = window}));
+  const std::vector<station::RobotEvent> events = wait(history_->events(robot_.id, {.window = window})).records;
   ASSERT_EQ(events.size(), 2u);
   EXPECT_EQ(events[0].kind, "event 3");
   EXPECT_EQ(events[1].kind, "event 2");
-  EXPECT_EQ(wait(history_->commands(robot_.id, {.window = window})).size(), 2u);
-  const auto without = wait(history_->commands(robot_.id, {.limit = 1, .has_renewals = false}));
+  EXPECT_EQ(wait(history_->commands(robot_.id, {.window = window})).records.size(), 2u);
+  const auto without = wait(history_->commands(robot_.id, {.limit = 1, .has_renewals = false})).records;
   ASSERT_EQ(without.size(), 1u) << "renewals do not count";
   EXPECT_EQ(without[0].id, 2u);
 }

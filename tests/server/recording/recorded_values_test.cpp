@@ -26,7 +26,7 @@ TEST_F(RecordedValuesTest, AnEventIsStoredWithItsCauseThatOfTheLatchAndItsDetail
   wait(recorder_->flush_records());
   EXPECT_EQ(rows("SELECT kind, cause, emergency_cause, detail FROM robot_event"),
             Rows{"link_lost|link_loss|operator|a sentence"});
-  const station::RobotEvent read = wait(history_->events(robot_.id, {.limit = 1})).at(0);
+  const station::RobotEvent read = wait(history_->events(robot_.id, {.limit = 1})).records.at(0);
   EXPECT_EQ(read.cause, event.cause);
   EXPECT_EQ(read.emergency_cause, event.emergency_cause);
   EXPECT_EQ(read.detail, event.detail);
@@ -66,7 +66,7 @@ TEST_F(RecordedValuesTest, WhatANewerFirmwareSaysIsStoredWithItsNumberAndReadBac
             Rows{"unknown|unknown|unknown|90"});
   const storage::SamplePage page = wait(history_->samples(run, std::nullopt, 1000)).value();
   EXPECT_EQ(static_cast<int>(page.samples.at(0).mode), 17);
-  const station::RobotEvent read = wait(history_->events(robot_.id, {.limit = 1})).at(0);
+  const station::RobotEvent read = wait(history_->events(robot_.id, {.limit = 1})).records.at(0);
   EXPECT_EQ(static_cast<int>(read.mode), 17);
   EXPECT_EQ(static_cast<int>(*read.emergency_cause), 30);
   EXPECT_EQ(read.unknown_values, event.unknown_values);

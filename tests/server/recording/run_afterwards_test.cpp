@@ -256,16 +256,16 @@ TEST_F(RunAfterwardsTest, MarkersStandAtTheSampleOfTheirTime) {
   EXPECT_EQ(mark(std::nullopt).error().code, ErrorCode::not_connected);
 
   const storage::RunId run = made(storage::SeqSpan{first_boot, 0, 50})->id;
-  const auto of_run = wait(markers.of_run(run));
+  const auto of_run = wait(markers.of_run(run, {}, 100));
   ASSERT_TRUE(of_run.has_value());
-  ASSERT_EQ(of_run->size(), 1u);
-  EXPECT_EQ(of_run->at(0).id, then->id);
-  EXPECT_EQ(of_run->at(0).text, "glucose in");
-  EXPECT_EQ(of_run->at(0).utc_us, then->utc_us);
+  ASSERT_EQ(of_run->markers.size(), 1u);
+  EXPECT_EQ(of_run->markers.at(0).id, then->id);
+  EXPECT_EQ(of_run->markers.at(0).text, "glucose in");
+  EXPECT_EQ(of_run->markers.at(0).utc_us, then->utc_us);
   EXPECT_EQ(wait(markers.of_robot(robot_.id, 0, 100)).size(), 4u);
   EXPECT_EQ(wait(markers.of_robot(robot_.id, then->id, 1)).size(), 1u);
   EXPECT_EQ(wait(markers.of_robot("dory", 0, 100)).size(), 0u);
-  EXPECT_EQ(wait(markers.of_run(99)).error().code, ErrorCode::not_found);
+  EXPECT_EQ(wait(markers.of_run(99, {}, 100)).error().code, ErrorCode::not_found);
 }
 
 TEST_F(RunAfterwardsTest, ARunKeepsTheConfigurationItWasMadeUnder) {

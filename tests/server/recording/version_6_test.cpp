@@ -123,7 +123,7 @@ TEST_F(Version6Test, WhatWasOverwrittenStaysAndIsMarked) {
   EXPECT_EQ(rows("SELECT kind, cause FROM event ORDER BY event_row"), before);
   EXPECT_EQ(number("SELECT count(*) FROM robot_event WHERE emergency_cause IS NULL AND detail = ''"), 17);
   start();
-  for (const station::RobotEvent& event : wait(history_->events("nemo", {.limit = 100}))) {
+  for (const station::RobotEvent& event : wait(history_->events("nemo", {.limit = 100})).records) {
     EXPECT_FALSE(event.emergency_cause.has_value());
     if (event.kind == "link_lost") EXPECT_EQ(event.cause, "operator");
     if (event.kind == "disconnected") EXPECT_NE(event.cause, "none");

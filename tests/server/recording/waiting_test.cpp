@@ -229,7 +229,7 @@ TEST_F(WaitingTest, TheFirstAndTheLastArrivalOfASegmentAreStored) {
   const std::vector<storage::Segment> segments = recorder_->waiting(robot_.boot_id, kAll);
   ASSERT_EQ(segments.size(), 1u);
   EXPECT_EQ(segments[0].first_received_at_us, first_us);
-  EXPECT_EQ(segments[0].received_at_us, first_us + 50'000);
+  EXPECT_EQ(segments[0].received_at_us, 0) << "others may follow";
   flush();
   EXPECT_EQ(number("SELECT first_received_at_us FROM segment"), first_us);
   EXPECT_EQ(number("SELECT received_at_us FROM segment"), first_us + 50'000);

@@ -93,12 +93,12 @@ class LiveScene extends Scene {
     this.marks.take_events(events);
     this.marks.take_commands(commands);
     this.marks.set_runs(runs);
-    for (let after = 0, full = true; full;) {
-      const markers = await api.robot_markers(robot_id, after);
-      this.marks.take_markers(markers);
-      after = markers.at(-1)?.marker_id ?? after;
-      full = markers.length === 1000;
-    }
+    let after: number | null = null;
+    do {
+      const page: Awaited<ReturnType<typeof api.robot_markers>> = await api.robot_markers(robot_id, after);
+      this.marks.take_markers(page.markers);
+      after = page.next;
+    } while (after !== null);
     this.mark_dirty();
   }
 

@@ -36,7 +36,7 @@ class Records {
     const is_empty = this.empty_pages-- > 0;
     return Promise.resolve({
       entries: is_empty ? [] : entries,
-      next_before: oldest > 1 ? oldest : null,
+      next: oldest > 1 ? oldest : null,
       head: `${this.size}:ab`,
     });
   };
@@ -58,7 +58,7 @@ test('newest first, and older pages until there are none', async () => {
   await list.older();
   await list.older();
   expect(numbers(list)).toEqual([5, 4, 3, 2, 1]);
-  expect(list.next_before.value).toBeNull();
+  expect(list.next.value).toBeNull();
   await list.older();
   expect(numbers(list)).toEqual([5, 4, 3, 2, 1]);
 });

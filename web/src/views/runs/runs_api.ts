@@ -61,7 +61,17 @@ export class RunsApi {
   run = (run_id: number) => this.api.read<Run>(`/runs/${run_id}`);
   certificate = (run_id: number) => this.api.read<Certificate>(`/runs/${run_id}/certificate`);
   metrics = (run_id: number) => this.api.read<RunMetrics>(`/runs/${run_id}/metrics`);
-  markers = async (run_id: number) => (await this.api.read<{ markers: Marker[] }>(`/runs/${run_id}/markers`)).markers;
+  markers = async (run_id: number): Promise<Marker[]> => {
+    const found: Marker[] = [];
+    let after: string | null = null;
+    do {
+      const path: string = `/runs/${run_id}/markers?${query({ after, limit: 1000 })}`;
+      const page: Schemas['RunMarkerList'] = await this.api.read<Schemas['RunMarkerList']>(path);
+      found.push(...page.markers);
+      after = page.next;
+    } while (after !== null);
+    return found;
+  };
   // What is not there of a run; of a run with very many gaps the first ones.
   losses = async (run_id: number): Promise<Losses> => {
     const found: Losses = { gaps: [], missing: [], is_whole: false };

@@ -74,7 +74,7 @@ function Entries({ context }: { context: Context }) {
         <Table entries={entries} context={context} />
       )}
       <p class="station-more">
-        {list.next_before.value !== null && (
+        {list.next.value !== null && (
           <button
             type="button"
             id="station-audit-older"
@@ -85,8 +85,7 @@ function Entries({ context }: { context: Context }) {
           </button>
         )}
         <span class="quiet" role="status">
-          {entries.length > 0 &&
-            `${count(entries.length)} shown${list.next_before.value === null ? ', which is all' : ''}`}
+          {entries.length > 0 && `${count(entries.length)} shown${list.next.value === null ? ', which is all' : ''}`}
         </span>
       </p>
       {list.head.value && (

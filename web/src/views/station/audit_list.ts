@@ -14,7 +14,7 @@ export class AuditList {
   readonly head = signal<string | null>(null);
   readonly is_busy = signal(false);
   readonly is_known = signal(false); // something was answered
-  readonly next_before = signal<number | null>(null); // null: there is nothing older
+  readonly next = signal<number | null>(null); // null: there is nothing older
   readonly problem = signal('');
   private filter: AuditFilter = { actor: '', action: '', robot_id: '' };
   private turn = 0;
@@ -24,13 +24,13 @@ export class AuditList {
   async begin(filter: AuditFilter): Promise<void> {
     this.filter = filter;
     this.entries.value = [];
-    this.next_before.value = null;
+    this.next.value = null;
     this.is_known.value = false;
     await this.look(null);
   }
 
   older = async (): Promise<void> => {
-    if (this.next_before.peek() !== null && !this.is_busy.peek()) await this.look(this.next_before.peek());
+    if (this.next.peek() !== null && !this.is_busy.peek()) await this.look(this.next.peek());
   };
 
   // What has come since. Where more came than a page holds, the list begins anew.
@@ -45,9 +45,9 @@ export class AuditList {
       const newest = this.entries.peek()[0]?.entry ?? 0;
       const fresh = page.entries.filter(({ entry }) => entry > newest);
       if (fresh.length === 0) return;
-      const has_gap = fresh.length === page.entries.length && page.next_before !== null && newest > 0;
+      const has_gap = fresh.length === page.entries.length && page.next !== null && newest > 0;
       this.entries.value = has_gap ? fresh : [...fresh, ...this.entries.peek()];
-      if (has_gap || newest === 0) this.next_before.value = page.next_before;
+      if (has_gap || newest === 0) this.next.value = page.next;
     } catch (error) {
       if (turn === this.turn) this.problem.value = refusal(error);
     }
@@ -66,7 +66,7 @@ export class AuditList {
         if (turn !== this.turn) return;
         this.entries.value = [...this.entries.peek(), ...page.entries];
         if (before === null) this.head.value = page.head;
-        this.next_before.value = before = page.next_before;
+        this.next.value = before = page.next;
         this.is_known.value = true;
         this.problem.value = '';
         found = page.entries.length;
