@@ -19,12 +19,12 @@ import signal
 import sys
 import time
 
-from station_link import PERIOD_US, Ring, StationLink, address, pb, token_in, trust_in
+from station_link import PERIOD_US, Ring, StationLink, address, authority, pb
 
 LEASE_MS, MAX_LIFE_US, AUTO_LIMIT_S = 500, 10_000_000, 600
 MAX_TIMED, MAX_SCHEDULE = 4, 64
 RING_SAMPLES, RING_EVENTS = 6_000, 64  # one minute without a station loses nothing
-POSITION_LIMIT_M = 1.2  # on both sides the track ends there
+POSITION_LIMIT_M, RETURN_M = 1.2, 0.001  # on both sides the track ends there; so far inside it the cart is back
 KP_PER_M, KD_S_PER_M = 10.0, 1.0
 
 
@@ -53,12 +53,17 @@ def check(condition, otherwise):
         raise Refused(otherwise)
 
 
+def check_range(limit, *values):
+    check(all(map(math.isfinite, values)), "not_finite")
+    check(all(abs(value) <= limit for value in values), "out_of_range")
+
+
 class Robot:
     """State, commands and the tick. It knows no sockets: what it has to say waits here for a connection."""
 
     def __init__(self, robot_id, token):
         self.robot_id, self.token = robot_id, token
-        self.boot_id, self.started_ns = secrets.randbits(64) or 1, time.monotonic_ns()
+        self.boot_id, self.started_ns = secrets.randbits(64) or 1, time.clock_gettime_ns(time.CLOCK_BOOTTIME)
         self.cart, self.zero_m, self.is_outside = Cart(), 0.0, False
         self.samples, self.events = Ring(RING_SAMPLES), Ring(RING_EVENTS)
         self.mode, self.duty, self.setpoint_m = pb.MODE_MANUAL, 0.0, None
@@ -75,7 +80,8 @@ class Robot:
         self.note("boot", "reset")
 
     def now_us(self):
-        return (time.monotonic_ns() - self.started_ns) // 1000
+        # SAFETY: this clock counts while the computer sleeps, and no command of before is valid afterwards.
+        return (time.clock_gettime_ns(time.CLOCK_BOOTTIME) - self.started_ns) // 1000
 
     @property
     def position_m(self):
@@ -85,10 +91,6 @@ class Robot:
     def seen_m(self):
         """The position as the controller and telemetry see it."""
         return self.position_m + self.disturbance_m
-
-    @property
-    def has_orders(self):
-        return self.duty != 0 or bool(self.schedule)
 
     def hello(self):
         return pb.Hello(
@@ -120,27 +122,37 @@ class Robot:
             emergency_id=self.emergency_id, emergency_cause=self.emergency_cause))
 
     def step(self, tick_us):
-        """One tick: what time has ended, where the cart is, what the motor gets, and the sample of it."""
+        """One tick: where the cart is, what time has ended, what the motor gets, and the sample of it."""
         dt_us, self.ticked_us = tick_us - self.ticked_us, tick_us
-        self.watch_link(tick_us)
-        self.watch_time(tick_us)
+        self.missed_ticks += dt_us // PERIOD_US - 1  # they are counted, not caught up
         self.cart.move(dt_us / 1e6)
+        now_us = self.now_us()  # SAFETY: a tick may be late; what has ended by now has ended
+        self.watch_link(now_us)
+        self.watch_time(now_us)
         self.watch_position()
         self.run_timed(tick_us)
         self.follow_schedule(tick_us)
-        duty = self.controller() if self.mode == pb.MODE_AUTO else self.duty
-        # SAFETY: whatever was computed above, the motor is off in an emergency.
-        self.cart.duty = 0.0 if self.mode == pb.MODE_EMERGENCY else duty
+        self.cart.duty = self.permitted(self.controller() if self.mode == pb.MODE_AUTO else self.duty)
         reference_m = math.nan if self.setpoint_m is None else self.setpoint_m
         values = (self.seen_m, self.cart.velocity_m_s, self.cart.acceleration_m_s2, self.cart.duty,
                   math.nan, reference_m)  # it has no impedance sensor
         self.samples.add((tick_us, self.per_batch(), values))
 
     def controller(self):
-        """Proportional on the error, derivative on the measured speed."""
-        duty = KP_PER_M * (self.setpoint_m - self.seen_m) - KD_S_PER_M * self.cart.velocity_m_s
-        self.is_saturated = abs(duty) > 1
-        return max(-1.0, min(1.0, duty))
+        """The duty wanted in auto, also beyond [-1, 1]: proportional on the error, derivative on the measured speed."""
+        return KP_PER_M * (self.setpoint_m - self.seen_m) - KD_S_PER_M * self.cart.velocity_m_s
+
+    def permitted(self, wanted):
+        """What the motor gets of the duty wanted."""
+        if not self.is_sound(wanted) and self.mode != pb.MODE_EMERGENCY:  # SAFETY: nothing steers by what is not a number
+            self.stop(pb.EMERGENCY_CAUSE_INTERNAL_ERROR, "internal")
+        self.is_saturated = self.mode == pb.MODE_AUTO and abs(wanted) > 1
+        # SAFETY: whatever was computed before, the motor is off in an emergency, and outside the track it only leads back.
+        is_outward = self.is_outside and wanted * self.cart.position_m > 0
+        return 0.0 if self.mode == pb.MODE_EMERGENCY or is_outward else max(-1.0, min(1.0, wanted))
+
+    def is_sound(self, wanted=0.0):
+        return all(map(math.isfinite, (self.cart.position_m, self.cart.velocity_m_s, wanted)))
 
     def watch_link(self, now_us):
         # SAFETY: without a station the robot comes to rest, and nothing moves by itself when the link is back.
@@ -159,25 +171,25 @@ class Robot:
             self.note("link_restored", "none", (now_us - self.heard_us) / 1e6)
         self.heard_us = now_us
 
-    def watch_time(self, tick_us):
+    def watch_time(self, now_us):
         # SAFETY: no duty runs and no command waits longer than its lease, and auto runs no longer than its limit.
-        if self.has_orders and tick_us >= self.lease_until_us:
+        if (self.duty or self.schedule) and now_us >= self.lease_until_us:
             lapsed, self.duty, self.has_lapsed = self.duty, 0.0, True
             self.schedule.clear()
             self.note("lease_lapsed", "time", lapsed)
             self.drop_timed("expired")
-        if tick_us >= self.timed_until_us:
+        if now_us >= self.timed_until_us:
             self.drop_timed("expired")
-        if self.mode == pb.MODE_AUTO and tick_us >= self.auto_until_us:
+        if self.mode == pb.MODE_AUTO and now_us >= self.auto_until_us:
             self.note("auto_limit", "time", AUTO_LIMIT_S)
             self.rest(pb.MODE_MANUAL, "time")
 
     def run_timed(self, tick_us):
         while self.timed and tick_us >= self.timed[0].execute_at_robot_us:
-            command = self.timed.pop(0)
+            command, now_us = self.timed.pop(0), self.now_us()
             try:
-                check(tick_us <= command.valid_until_robot_us, "expired")
-                self.carry_out(command, tick_us)
+                check(now_us <= command.valid_until_robot_us, "expired")
+                self.carry_out(command, now_us)
             except Refused as refused:
                 self.acknowledge(command, refused.args[0])  # for the second time
 
@@ -194,26 +206,28 @@ class Robot:
                 self.note("duty_schedule_ended", "time")
 
     def watch_position(self):
-        was_outside, self.is_outside = self.is_outside, abs(self.position_m) > POSITION_LIMIT_M
+        was_outside, limit_m = self.is_outside, POSITION_LIMIT_M - RETURN_M * self.is_outside
+        self.is_outside = abs(self.cart.position_m) > limit_m
         if self.is_outside and not was_outside:
-            self.note("limit_hit", "limit", math.copysign(POSITION_LIMIT_M, self.position_m))
+            self.note("limit_hit", "limit", math.copysign(POSITION_LIMIT_M, self.cart.position_m) - self.zero_m)
             if self.mode != pb.MODE_EMERGENCY:  # SAFETY: the end of the track stops the cart
                 self.stop(pb.EMERGENCY_CAUSE_POSITION_LIMIT, "limit")
 
     def rest(self, mode, cause, command_id=0):
-        """Enters the mode with the motor off: no duty, lease or setpoint outlives a change of mode."""
-        self.cart.duty = self.duty = self.disturbance_m = 0.0
-        self.schedule.clear()
+        """Enters the mode with the motor off: no duty, lease, setpoint or timed command outlives a change of mode."""
         was, self.mode, self.setpoint_m = self.mode, mode, None
-        if was != mode:
-            self.drop_timed("latched" if mode == pb.MODE_EMERGENCY else "wrong_mode")
+        self.duty = self.disturbance_m = 0.0
+        self.schedule.clear()
         self.has_lapsed = self.is_saturated = False
+        self.drop_timed("latched" if mode == pb.MODE_EMERGENCY else "wrong_mode")
         if was != mode and pb.MODE_EMERGENCY not in (was, mode):
             self.note("mode_changed", cause, command_id=command_id)
+        self.cart.duty = 0.0  # SAFETY: off at once, also between two ticks; last, since a driver that fails ends the program
 
     def stop(self, emergency_cause, cause, command_id=0):
-        self.rest(pb.MODE_EMERGENCY, cause)  # SAFETY: the motor is off before anything else, until this latch is cleared
+        # SAFETY: the latch comes before the motor's driver, which may fail, and stays until it is cleared.
         self.emergency_id, self.emergency_cause = secrets.randbits(64) or 1, emergency_cause
+        self.rest(pb.MODE_EMERGENCY, cause)
         self.note("emergency", cause, command_id=command_id)
 
     def on_command(self, command, now_us):
@@ -238,7 +252,8 @@ class Robot:
         is_repeated = command.command_id != 0 and command.command_id in self.recent_ids
         if action == "emergency_stop":  # SAFETY: obeyed in every state, whatever its boot and its age
             check(not is_repeated or self.emergency_id == 0, "duplicate")
-            self.recent_ids.append(command.command_id)
+            if command.command_id != 0 and not is_repeated:
+                self.recent_ids.append(command.command_id)
             self.stop(pb.EMERGENCY_CAUSE_OPERATOR, "command", command.command_id)
             return now_us
         check(command.command_id != 0 and action is not None, "malformed")
@@ -274,19 +289,19 @@ class Robot:
         check(self.mode in modes, "wrong_mode")
 
     def do_set_mode(self, wanted, command_id, now_us):
+        self.check_mode(pb.MODE_MANUAL, pb.MODE_AUTO)
         is_auto = wanted.mode == pb.MODE_AUTO
         check(is_auto or wanted.mode == pb.MODE_MANUAL, "malformed")
         check(wanted.HasField("setpoint_m") == is_auto, "malformed")
-        self.check_mode(pb.MODE_MANUAL, pb.MODE_AUTO)
-        self.check_setpoint(wanted.setpoint_m)
+        if is_auto:
+            self.check_setpoint(wanted.setpoint_m)
         self.rest(wanted.mode, "command", command_id)
         if is_auto:
             self.auto_until_us = now_us + AUTO_LIMIT_S * 1_000_000
             self.do_set_setpoint(wanted, command_id, now_us)
 
     def check_setpoint(self, setpoint_m):
-        check(math.isfinite(setpoint_m), "not_finite")
-        check(abs(setpoint_m) <= POSITION_LIMIT_M, "out_of_range")
+        check_range(POSITION_LIMIT_M + 1e-6, self.zero_m + setpoint_m)  # as a float of 32 bits, 1.2 is a little more
 
     def do_set_setpoint(self, wanted, command_id, _):
         self.check_mode(pb.MODE_AUTO)
@@ -294,12 +309,15 @@ class Robot:
         self.setpoint_m = wanted.setpoint_m
         self.note("setpoint_changed", "command", self.setpoint_m, command_id)
 
+    def check_duties(self, *duties):
+        check_range(1, *duties)
+        # SAFETY: beyond an end of the track only the way back is open.
+        check(not self.is_outside or all(duty * self.cart.position_m <= 0 for duty in duties), "outward")
+
     def do_set_duty(self, wanted, _, now_us):
         self.check_mode(pb.MODE_MANUAL)
-        check(math.isfinite(wanted.duty), "not_finite")
-        check(abs(wanted.duty) <= 1 and wanted.lease_ms <= LEASE_MS, "out_of_range")
-        # SAFETY: beyond an end of the track only the way back is open.
-        check(not self.is_outside or wanted.duty * self.position_m <= 0, "outward")
+        check(wanted.lease_ms <= LEASE_MS, "out_of_range")
+        self.check_duties(wanted.duty)
         self.duty, self.has_lapsed = wanted.duty, False
         self.schedule.clear()
         self.lease_until_us = now_us + 1000 * (wanted.lease_ms or LEASE_MS)
@@ -309,16 +327,14 @@ class Robot:
         ticks, duties = list(wanted.tick), list(wanted.duty)
         check(0 < len(ticks) == len(duties) <= MAX_SCHEDULE and duties[-1] == 0, "malformed")
         check(all(one < next_one for one, next_one in zip(ticks, ticks[1:])), "malformed")
-        check(all(map(math.isfinite, duties)), "not_finite")
-        check(max(map(abs, duties)) <= 1, "out_of_range")
-        check(not self.is_outside or all(duty * self.position_m <= 0 for duty in duties), "outward")
+        self.check_duties(*duties)
         self.duty, self.has_lapsed = 0.0, False
         self.schedule, self.schedule_began_us = collections.deque(zip(ticks, duties)), None
         self.lease_until_us = now_us + 1000 * LEASE_MS
 
     def do_inject_disturbance(self, wanted, command_id, _):
         self.check_mode(pb.MODE_AUTO)
-        self.check_setpoint(wanted.disturbance_m)
+        check_range(POSITION_LIMIT_M, wanted.disturbance_m)
         self.disturbance_m = wanted.disturbance_m
         self.note("disturbance", "command", self.disturbance_m, command_id)
 
@@ -326,23 +342,24 @@ class Robot:
         check(self.mode != pb.MODE_EMERGENCY, "latched")
         check(wanted.lease_ms <= LEASE_MS, "out_of_range")
         # SAFETY: a lease that has lapsed is not renewed, not even before the tick that would notice it.
-        has_duty = self.has_orders and now_us < self.lease_until_us
+        has_duty = bool(self.duty or self.schedule) and now_us < self.lease_until_us
         has_timed = bool(self.timed) and now_us < self.timed_until_us
         check(has_duty or has_timed, "nothing_to_renew")
         until_us = now_us + 1000 * (wanted.lease_ms or LEASE_MS)
-        self.lease_until_us = until_us if has_duty else self.lease_until_us
-        self.timed_until_us = until_us if has_timed else self.timed_until_us
+        self.lease_until_us, self.timed_until_us = has_duty and until_us, has_timed and until_us  # 0: it had lapsed
 
     def do_clear_emergency(self, wanted, command_id, _):
         # SAFETY: only the latch that the sender has seen is cleared, never one that came after it.
         check(self.emergency_id != 0 and wanted.emergency_id == self.emergency_id, "other_emergency")
+        check(self.is_sound(), "cause_stands")
         self.emergency_id, self.emergency_cause = 0, pb.EMERGENCY_CAUSE_NONE
         self.rest(pb.MODE_MANUAL, "command")
         self.note("emergency_cleared", "command", command_id=command_id)
 
     def do_zero_position(self, _, command_id, __):
+        """Moves the zero of setpoints and telemetry; the track ends where it ended."""
         self.check_mode(pb.MODE_MANUAL)
-        check(not self.has_orders, "motor_on")
+        check(not self.duty and not self.schedule and self.cart.duty == 0, "motor_on")
         before_m, self.zero_m = self.position_m, self.cart.position_m
         self.note("position_zeroed", "command", before_m, command_id)
 
@@ -353,40 +370,25 @@ class Robot:
         pass
 
 
-async def keep_ticking(robot, link):
-    due_us = 0
-    while True:
-        # Missed ticks are counted, not caught up: the next one is due at the next multiple of the period.
-        missed = max(0, robot.now_us() - due_us) // PERIOD_US
-        robot.missed_ticks += missed
-        due_us += (1 + missed) * PERIOD_US
-        await asyncio.sleep((due_us - robot.now_us()) / 1e6)
-        robot.step(due_us)
-        link.on_tick()
-
-
-async def run(options):
-    robot = Robot(options.id, options.token_file or "")
-    link = StationLink(robot, *options.station, options.tls_ca)
-    try:
-        async with asyncio.TaskGroup() as tasks:
-            tasks.create_task(keep_ticking(robot, link))
-            tasks.create_task(link.stay_connected())
-    finally:
-        robot.cart.duty = 0.0  # SAFETY: a program that ends leaves the motor off
-
-
 def main():
     parser = argparse.ArgumentParser(description="A simulated cart on a track, for a Rheonaut station.")
     parser.add_argument("--station", type=address, default="127.0.0.1:7070", metavar="HOST:PORT")
     parser.add_argument("--id", default="cart-1", help="1 to 31 characters of [a-z0-9_-]")
-    parser.add_argument("--token-file", type=token_in, help="with the token that `rheonaut robot enroll` prints")
-    parser.add_argument("--tls-ca", type=trust_in, help="TLS, with a station whose certificate this authority has signed")
-    signal.signal(signal.SIGTERM, signal.default_int_handler)  # both ways to end it end it in the same way
+    parser.add_argument("--token-file", type=argparse.FileType(), help="with the token that `rheonaut robot enrol` prints")
+    parser.add_argument("--tls-ca", type=authority, help="TLS, with a station whose certificate this authority has signed")
+    options = parser.parse_args()
+    if options.token_file and not options.tls_ca and options.station[0] not in ("127.0.0.1", "::1", "localhost"):
+        parser.error(f"--token-file without --tls-ca: anybody between here and {options.station[0]} could read the token")
+    robot = Robot(options.id, options.token_file.read().strip() if options.token_file else "")
+    for end in (signal.SIGTERM, signal.SIGHUP):
+        if signal.getsignal(end) != signal.SIG_IGN:  # nohup ignores SIGHUP
+            signal.signal(end, signal.default_int_handler)  # it ends like Ctrl-C
     try:
-        asyncio.run(run(parser.parse_args()))
+        asyncio.run(StationLink(robot, *options.station, options.tls_ca).run())
     except KeyboardInterrupt:
         return 0
+    finally:
+        robot.cart.duty = 0.0  # SAFETY: a program that ends leaves the motor off
 
 
 if __name__ == "__main__":

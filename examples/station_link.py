@@ -1,7 +1,8 @@
 """A robot's connection to a Rheonaut station, as docs/protocol.md describes it: kept up, and nothing is lost over it.
 
-What it asks of the robot: now_us(), hello(), status(), on_command() and heard(); is_link_lost, link_timeout_us and bad_frames;
-the rings `samples`, of (robot_time_us, fields of the batch, values), and `events`; the queues `stop_acks` and `acks`.
+What it asks of the robot: now_us(), step(), hello(), status(), on_command() and heard(); ticked_us, is_link_lost,
+link_timeout_us and bad_frames; the rings `samples`, of (robot_time_us, fields of the batch, values), and `events`; the
+queues `stop_acks` and `acks`.
 """
 import argparse
 import asyncio
@@ -9,6 +10,7 @@ import collections
 import importlib
 import pathlib
 import random
+import socket
 import ssl
 import subprocess
 import sys
@@ -38,7 +40,7 @@ def compiled_messages():
 pb = compiled_messages()
 PERIOD_US = 10_000
 PER_SAMPLE = ("position_m", "velocity_m_s", "acceleration_m_s2", "duty", "impedance_mv", "reference_m")
-MAX_FRAME_BYTES, MAX_BATCH = 1024, 25
+MAX_FRAME_BYTES, MAX_BATCH, MAX_UNSENT_BYTES = 1024, 25, 4096
 ATTEMPT_S = 2.0  # from dialling to the Welcome
 
 
@@ -72,6 +74,14 @@ class Ring:
         return self.items[seq - self.oldest_seq]
 
 
+class LinkEnded(Exception):
+    """Why a connection ended, in words. Any other exception is the robot's own and ends the program."""
+
+
+class BadFrame(LinkEnded):
+    """A frame that no station sends, or not at this point."""
+
+
 class Connection:
     """One connection: Hello, what is received, and what is sent, the most urgent first."""
 
@@ -79,37 +89,44 @@ class Connection:
         self.robot, self.reader, self.writer = robot, reader, writer
         self.is_welcome, self.sent_us, self.status_us = False, 0, 0
         self.probe_answers, self.clock_answers = collections.deque(maxlen=4), collections.deque(maxlen=4)
+        self.answers = (("command_ack", robot.stop_acks), ("stop_probe_answer", self.probe_answers),
+                        ("command_ack", robot.acks), ("heartbeat", self.clock_answers))  # the most urgent first
         self.send(hello=robot.hello())
 
     async def receive(self):
-        """Acts on one frame: its length, a varint of one or two bytes, and its payload."""
+        """Reads one frame: its length, a varint of one or two bytes, and its payload."""
         size = (await self.reader.readexactly(1))[0]
         if size >= 0x80:
             size += ((await self.reader.readexactly(1))[0] - 1) << 7
         if size > MAX_FRAME_BYTES:
-            raise ValueError(f"a frame of {size} bytes: this is no Rheonaut station")
-        frame = pb.StationFrame.FromString(await self.reader.readexactly(size))
-        self.on_frame(frame, self.robot.now_us())
-        self.flush()
+            raise BadFrame(f"a frame of {size} bytes: this is no Rheonaut station")
+        try:
+            return pb.StationFrame.FromString(await self.reader.readexactly(size))
+        except DecodeError as error:
+            raise BadFrame(f"a frame that cannot be decoded: {error}") from error
 
     def on_frame(self, frame, now_us):
         body = frame.WhichOneof("body")
         if self.is_welcome:
             self.robot.heard(now_us)  # every frame is a sign of life
-        if body == "command":
+        # SAFETY: before the Welcome there is no link that could be lost, so nothing but a stop is obeyed.
+        if body == "command" and (self.is_welcome or frame.command.WhichOneof("action") == "emergency_stop"):
             self.robot.on_command(frame.command, now_us)
-        elif body == "stop_probe":
-            self.probe_answers.append(pb.StopProbeAnswer(echo_station_time_us=frame.stop_probe.station_time_us))
-        elif body == "heartbeat":
-            self.on_heartbeat(frame.heartbeat, now_us)
-        elif body == "welcome":
+        elif body == "welcome" and not self.is_welcome:
             self.on_welcome(frame.welcome, now_us)
+        elif body == "stop_probe" and self.is_welcome:
+            self.probe_answers.append(pb.StopProbeAnswer(echo_station_time_us=frame.stop_probe.station_time_us))
+        elif body == "heartbeat" and self.is_welcome:
+            self.on_heartbeat(frame.heartbeat, now_us)
         else:
-            raise ValueError("a frame without a body that this robot knows")
+            raise BadFrame(f"{body or 'a frame without a body'} {'after' if self.is_welcome else 'before'} the Welcome")
+        self.flush()
 
     def on_welcome(self, welcome, now_us):
         if welcome.refusal:
-            raise ConnectionError(f"refused: {welcome.detail}")
+            raise LinkEnded(f"refused: {welcome.detail}")
+        if welcome.protocol_version != 1:
+            raise LinkEnded(f"the station speaks version {welcome.protocol_version} of the protocol, this robot version 1")
         robot = self.robot
         robot.link_timeout_us = 1000 * max(100, min(5000, welcome.link_timeout_ms or 1000))
         self.heartbeat_us = min(1000 * (welcome.heartbeat_interval_ms or 200), robot.link_timeout_us // 2)
@@ -139,7 +156,7 @@ class Connection:
 
     def on_tick(self):
         if self.is_welcome and self.robot.is_link_lost:
-            return self.writer.transport.abort()  # the station was silent for too long: dial again
+            return self.reader.set_exception(TimeoutError("no frame within the link time-out"))  # dial again
         if self.is_welcome:
             self.credit = min(self.credit + 2, MAX_BATCH)  # backfill takes at most twice the rate of live samples
         self.flush()
@@ -158,18 +175,12 @@ class Connection:
 
     def next_body(self):
         """What to send next, in the order of docs/protocol.md: a body of RobotFrame, or None."""
-        if self.robot.stop_acks:
-            return {"command_ack": self.robot.stop_acks.popleft()}
-        if not self.is_welcome:
-            return None  # until then only a stop is acknowledged
-        return self.next_answer() or self.next_event() or self.next_live() or self.next_status() or self.next_backfill()
-
-    def next_answer(self):
-        for body, waiting in (("stop_probe_answer", self.probe_answers), ("command_ack", self.robot.acks),
-                              ("heartbeat", self.clock_answers)):
+        for body, waiting in self.answers if self.is_welcome else self.answers[:1]:  # until then only a stop is acknowledged
             if waiting:
                 return {body: waiting.popleft()}
-        return None
+        if not self.is_welcome:
+            return None
+        return self.next_event() or self.next_live() or self.next_status() or self.next_backfill()
 
     def next_event(self):
         events = self.robot.events
@@ -182,12 +193,13 @@ class Connection:
         return {"event": event}
 
     def next_live(self):
-        """A batch that is full, or closed by a change of what its samples share."""
+        """A batch that is full, that a change of what its samples share has closed, or that such a change has opened now."""
         samples = self.robot.samples
         self.live_seq = max(self.live_seq, samples.oldest_seq)
         batch = self.batch(self.live_seq, min(samples.next_seq, self.live_seq + self.samples_per_frame))
         end_seq = self.live_seq + len(batch.duty)
-        if len(batch.duty) < self.samples_per_frame and end_seq == samples.next_seq:
+        has_changed = len(samples.items) > 1 and samples.items[-2][1] != samples.items[-1][1]
+        if end_seq == samples.next_seq and len(batch.duty) < self.samples_per_frame and not (batch.duty and has_changed):
             return None
         self.live_seq = end_seq
         return {"telemetry": batch}
@@ -225,7 +237,7 @@ class Connection:
 
 
 class StationLink:
-    """Dials the station, again and again."""
+    """Dials the station, again and again, while the robot ticks."""
 
     def __init__(self, robot, host, port, tls=None):
         self.robot, self.host, self.port, self.tls = robot, host, port, tls
@@ -236,53 +248,76 @@ class StationLink:
             print(f"robot.py: {line}", flush=True)
         self.said = line
 
-    def on_tick(self):
-        if self.connection:
-            self.connection.on_tick()
+    async def run(self):
+        async with asyncio.TaskGroup() as tasks:
+            tasks.create_task(self.keep_ticking())
+            tasks.create_task(self.stay_connected())
+
+    async def keep_ticking(self):
+        while True:
+            due_us = self.robot.ticked_us + PERIOD_US
+            await asyncio.sleep((due_us - self.robot.now_us()) / 1e6)
+            # A multiple of the period, also after a standstill; what was missed then is not caught up.
+            self.robot.step(max(due_us, self.robot.now_us() // PERIOD_US * PERIOD_US))
+            if self.connection:
+                self.connection.on_tick()
 
     async def stay_connected(self):
         while True:
             try:
                 await self.connect_and_serve()
-            except (OSError, EOFError, ValueError, DecodeError) as error:
-                self.robot.bad_frames += isinstance(error, (ValueError, DecodeError))
-                why = "the station closed the connection" if isinstance(error, EOFError) else str(error) or "no answer"
-                self.say(f"{self.host}:{self.port}: {why}")
+            except LinkEnded as ended:
+                self.robot.bad_frames += isinstance(ended, BadFrame)
+                self.say(f"{self.host}:{self.port}: {ended}")
             self.connection = None
             pause_s = random.uniform(0.1, 0.6)
             await asyncio.sleep(4 * pause_s if self.robot.samples.is_full() else pause_s)
 
     async def connect_and_serve(self):
-        async with asyncio.timeout(ATTEMPT_S) as attempt:
-            reader, writer = await asyncio.open_connection(self.host, self.port, ssl=self.tls)
-            try:
-                self.connection = Connection(self.robot, reader, writer)
-                while not self.connection.is_welcome:
-                    await self.connection.receive()
-                attempt.reschedule(None)
-                self.say(f"connected to {self.host}:{self.port} as {self.robot.robot_id}")
-                while True:
-                    await self.connection.receive()
-            finally:
-                writer.transport.abort()
+        deadline_s = asyncio.get_running_loop().time() + ATTEMPT_S
+        reader, writer = await from_network(self.dial(), deadline_s)
+        try:
+            self.connection = Connection(self.robot, reader, writer)
+            while True:
+                frame = await from_network(self.connection.receive(), None if self.connection.is_welcome else deadline_s)
+                self.connection.on_frame(frame, self.robot.now_us())
+                if frame.HasField("welcome"):
+                    self.say(f"connected to {self.host}:{self.port} as {self.robot.robot_id}")
+                await asyncio.sleep(0)  # frames that have come together do not delay the tick
+        finally:
+            writer.transport.abort()
+
+    async def dial(self):
+        reader, writer = await asyncio.open_connection(self.host, self.port)
+        # SAFETY: the answer to a stop overtakes what waits here, but not what a buffer below has taken already.
+        writer.get_extra_info("socket").setsockopt(socket.IPPROTO_TCP, socket.TCP_NOTSENT_LOWAT, MAX_UNSENT_BYTES)
+        writer.transport.set_write_buffer_limits(0)
+        if self.tls:
+            await writer.start_tls(self.tls, server_hostname=self.host)
+        return reader, writer
+
+
+async def from_network(reading, deadline_s):
+    """What dialling or reading gives; its errors end the link, and only they."""
+    try:
+        async with asyncio.timeout_at(deadline_s):
+            return await reading
+    except EOFError as error:
+        raise LinkEnded("the station closed the connection") from error
+    except (OSError, ValueError) as error:
+        raise LinkEnded(str(error) or "no answer") from error
 
 
 def address(text):
-    """HOST:PORT as an option of the command line; the next two are options as well."""
+    """HOST:PORT, an option of the command line."""
     host, _, port = text.rpartition(":")
     if not host or not port.isdecimal():
         raise argparse.ArgumentTypeError(f"'{text}' is not HOST:PORT")
     return host.strip("[]"), int(port)
 
 
-def token_in(path):
-    try:
-        return pathlib.Path(path).read_text(encoding="utf-8").strip()
-    except OSError as error:
-        raise argparse.ArgumentTypeError(error) from error
-
-
-def trust_in(path):
+def authority(path):
+    """TLS that trusts this file's certificate, an option of the command line."""
     try:
         return ssl.create_default_context(cafile=path)
     except OSError as error:

@@ -113,9 +113,19 @@ class TimedTest(Orders):
         self.now_us += 500_000
         self.assertEqual(self.answer(self.renew()), "nothing_to_renew")
 
+    def test_its_renewal_does_not_revive_a_duty_that_has_lapsed_between_two_ticks(self):
+        self.answer(self.duty(0.3))
+        self.now_us += 300_000
+        self.store(after_us=600_000)
+        self.now_us += 250_000
+        self.assertEqual(self.answer(self.renew()), "accepted")
+        self.run_for(10_000)
+        self.assertEqual(self.robot.cart.duty, 0.0)
+
     def test_what_drops_it_and_how(self):
         drop, manual = self.command(drop_timed=pb.DropTimed()), pb.SetMode(mode=pb.MODE_MANUAL)
-        for word, end in (("expired", drop), ("expired", self.duty(0.0)), ("wrong_mode", self.auto(0.0)), ("latched", self.stop())):
+        for word, end in (("expired", drop), ("expired", self.duty(0.0)), ("wrong_mode", self.command(set_mode=manual)),
+                          ("wrong_mode", self.auto(0.0)), ("latched", self.stop())):
             self.answer(self.command(set_mode=manual))
             waits = self.store()
             self.assertEqual(self.answer(end), "accepted")
@@ -152,8 +162,8 @@ class TimedTest(Orders):
         self.run_for(300_000)
         self.assertEqual(self.later_answers(), [(refused.command_id, "out_of_range")])
         late = self.store(after_us=100_000, life_us=100_000)
-        self.now_us += 300_000  # the program stood still
-        self.run_for(10_000)
+        due_us, self.now_us = self.now_us + 100_000, self.now_us + 300_000  # the program stood still
+        self.robot.step(due_us)
         self.assertEqual(self.later_answers(), [(late.command_id, "expired")])
         self.assertEqual(self.robot.duty, 0.0)
 

@@ -4,7 +4,7 @@ import unittest
 
 from example_robot import S, Bench  # first: it may go on in another Python
 
-from station_link import Connection, pb
+from station_link import BadFrame, Connection, LinkEnded, pb
 
 
 class JudgementTest(Bench):
@@ -64,6 +64,16 @@ class JudgementTest(Bench):
         self.assertEqual([self.answer(first), self.answer(refused)], ["duplicate", "duplicate"])
         self.assertEqual(self.answer(self.command(ping=pb.Ping())), "accepted")
         self.assertEqual(self.answer(first), "accepted", "forgotten after 64 others, as documented")
+
+    def test_a_stop_without_an_id_and_a_repeated_one_make_it_forget_no_id(self):
+        first, stop = self.duty(0.3), self.stop()
+        self.answer(first)
+        for _ in range(31):
+            self.answer(pb.Command(emergency_stop=pb.EmergencyStop()))
+            self.answer(self.clear(self.robot.emergency_id))
+            self.assertEqual(self.answer(stop), "accepted")
+            self.answer(self.clear(self.robot.emergency_id))
+        self.assertEqual(self.answer(first), "duplicate", "63 others came since")
 
     def test_a_stop_needs_no_boot_and_no_time_and_is_undone_by_its_own_id_alone(self):
         self.answer(self.duty(0.5))
@@ -164,10 +174,10 @@ class Wire:
 class OrderTest(Bench):
     def connect(self, **durable):
         self.wire = Wire()
-        self.connection = Connection(self.robot, None, self.wire)
+        self.connection = Connection(self.robot, self.wire, self.wire)
         self.assertEqual(self.wire.bodies(), ["hello"])
         if durable.pop("welcome", True):
-            self.receive(welcome=pb.Welcome(**durable))
+            self.receive(welcome=pb.Welcome(protocol_version=1, **durable))
 
     def receive(self, **body):
         self.connection.on_frame(pb.StationFrame(**body), self.now_us)
@@ -186,14 +196,36 @@ class OrderTest(Bench):
             self.run_for(10_000)
             self.connection.on_tick()
 
-    def test_before_the_welcome_only_a_stop_is_acknowledged(self):
+    def test_before_the_welcome_nothing_but_a_stop_is_obeyed(self):
         self.connect(welcome=False)
-        self.receive(command=self.command(ping=pb.Ping()))
-        self.receive(stop_probe=pb.StopProbe(station_time_us=1))
+        self.run_for(S)
+        for body in ({"command": self.duty(1.0)}, {"command": self.auto(1.0)}, {"stop_probe": pb.StopProbe(station_time_us=1)},
+                     {"heartbeat": pb.StationHeartbeat(durable_next_seq=50, resend_next_seq=9)}, {}):
+            with self.subTest(body=body), self.assertRaises(BadFrame):
+                self.receive(**body)
         self.run_ticks(10)
-        self.assertEqual(self.wire.bodies(), [])
+        self.assertEqual((self.wire.bodies(), self.robot.cart.duty, self.robot.samples.oldest_seq), ([], 0.0, 0))
         self.receive(command=self.stop())
         self.assertEqual(self.wire.bodies(), ["command_ack"])
+
+    def test_it_is_welcomed_once_and_by_a_station_of_its_version(self):
+        self.connect(welcome=False)
+        with self.assertRaisesRegex(LinkEnded, "version 2"):
+            self.receive(welcome=pb.Welcome(protocol_version=2))
+        self.receive(welcome=pb.Welcome(protocol_version=1))
+        with self.assertRaisesRegex(BadFrame, "welcome after the Welcome"):
+            self.receive(welcome=pb.Welcome(protocol_version=1))
+
+    def test_a_sample_that_shows_a_change_is_sent_at_once(self):
+        self.connect(samples_per_frame=25)
+        self.run_ticks(30)
+        self.wire.sent.clear()
+        self.answer(self.auto(0.5))
+        self.run_ticks(1)
+        batches = [frame.telemetry for frame in self.wire.sent if frame.WhichOneof("body") == "telemetry"]
+        self.assertEqual([(batch.mode, len(batch.duty)) for batch in batches], [(pb.MODE_MANUAL, 5), (pb.MODE_AUTO, 1)])
+        self.run_ticks(10)
+        self.assertEqual(sum(frame.WhichOneof("body") == "telemetry" for frame in self.wire.sent), 2, "and then as it fills")
 
     def test_acknowledgements_wait_for_a_connection_and_none_pushes_out_that_of_a_stop(self):
         self.answer_later(self.stop())
@@ -286,10 +318,10 @@ class OrderTest(Bench):
         self.run_ticks(100)
         self.assertIn("heartbeat", self.wire.bodies())
         dropped = []
-        self.wire.abort = lambda: dropped.append(self.now_us)
+        self.wire.set_exception = dropped.append
         self.run_for(2 * S, is_heard=False)
         self.connection.on_tick()
-        self.assertEqual(len(dropped), 1)
+        self.assertEqual([str(error) for error in dropped], ["no frame within the link time-out"])
 
 
 if __name__ == "__main__":

@@ -1,15 +1,20 @@
 """examples/robot.py with a real station, in real time: driven, stopped and cleared; every sample there once after a cut link
 and after the station's death; a command that comes too late; TLS and a token."""
+import asyncio
 import json
 import signal
 import socket
+import ssl
 import subprocess
 import sys
+import tempfile
+import threading
 import time
 import unittest
 
 from example_robot import EXAMPLES  # first: it may go on in another Python
 
+from station_link import StationLink
 from processes import ApiError, commanded, lab, wait_until
 from recording_audit import audit
 
@@ -63,22 +68,36 @@ class ExampleRobotTest(unittest.TestCase):
     def verified(self, kind, **arguments):
         """The station has seen the command's effect in the robot's telemetry. What a machine that stood still has let end
         too early, such as a lease, is given again."""
-        def is_verified():
-            command_id = commanded(self.station, kind, "cart-1", **arguments)["command_id"]
-            return wait_until(lambda: self.ended(command_id), PATIENCE_S, f"{kind} ends")["state"] == "verified"
-        wait_until(is_verified, PATIENCE_S, f"{kind} verified")
+        def attempt():
+            ended = self.ended(commanded(self.station, kind, "cart-1", **arguments))
+            return ended if ended["state"] == "verified" else None
+        return wait_until(attempt, PATIENCE_S, f"{kind} verified")
 
-    def ended(self, command_id):
-        record = self.station.get(f"/api/v1/commands/{command_id}")
-        return record if record["ended_at_us"] else None
+    def ended(self, command):
+        """The record of a command once it has ended."""
+        def record():
+            found = self.station.get(f"/api/v1/commands/{command['command_id']}")
+            return found if found["ended_at_us"] else None
+        return wait_until(record, PATIENCE_S, f"{command['kind']} has an end")
+
+    def stopped(self):
+        stopped = self.ended(self.station.post("/api/v1/robots/cart-1/emergency-stop"))
+        self.assertEqual(stopped["state"], "verified")
+        return stopped
+
+    def refusal(self, kind, **arguments):
+        with self.assertRaises(ApiError) as refused:
+            commanded(self.station, kind, "cart-1", **arguments)
+        return refused.exception.reason
 
     def more_samples(self, count=100):
         seen = self.robot()["next_seq"]
         wait_until(lambda: self.robot()["next_seq"] > seen + count, PATIENCE_S, f"{count} more samples")
 
-    def event(self, kind):
-        events = self.station.get("/api/v1/robots/cart-1/events?limit=1000")["events"]
-        return next((event for event in events if event["kind"] == kind), None)
+    def event(self, kind, after_us=0):
+        """The first of this kind since this time of the robot."""
+        events = reversed(self.station.get("/api/v1/robots/cart-1/events?limit=1000")["events"])
+        return next((event for event in events if event["kind"] == kind and event["robot_time_us"] > after_us), None)
 
     def samples_from(self, first_seq, robot_time_us=0):
         """Of the boot, from this number and this time on, to the latest."""
@@ -114,8 +133,8 @@ class ExampleRobotTest(unittest.TestCase):
         wait_until(lambda: self.robot()["stop_path"]["is_open"], PATIENCE_S, "the way of a stop is open")
         wait_until(lambda: self.robot()["clock"], PATIENCE_S, "its clock is known")
 
-        self.verified("set_duty", duty=0.4)
-        lapsed = wait_until(lambda: self.event("lease_lapsed"), PATIENCE_S, "the lease lapses")
+        driven_us = self.verified("set_duty", duty=0.4)["effect_at_robot_us"]
+        lapsed = wait_until(lambda: self.event("lease_lapsed", driven_us), PATIENCE_S, "the lease lapses")
         self.assertAlmostEqual(lapsed["value"], 0.4, places=6)
         self.assertGreater(self.robot()["sample"]["position_m"], 0.01)
         self.assert_nothing_moves(lapsed["robot_time_us"])
@@ -124,21 +143,15 @@ class ExampleRobotTest(unittest.TestCase):
         wait_until(lambda: abs(self.robot()["sample"]["position_m"] - 0.2) < 0.002, PATIENCE_S, "it is there")
         self.verified("set_setpoint", setpoint_m=-0.5)
         wait_until(lambda: self.robot()["sample"]["velocity_m_s"] < -0.1, PATIENCE_S, "it moves")
-        stopped = station.post("/api/v1/robots/cart-1/emergency-stop")
-        ended = wait_until(lambda: self.ended(stopped["command_id"]), PATIENCE_S, "the stop has an end")
-        self.assertEqual(ended["state"], "verified")
+        stopped = self.stopped()
         self.assertEqual(self.robot()["mode"], "emergency")
-        with self.assertRaises(ApiError) as refused:
-            station.command("cart-1", "set_duty", duty=0.1)
-        self.assertEqual(refused.exception.reason, "latched")
+        self.assertEqual(self.refusal("set_duty", duty=0.1), "latched", "by the station; the robot's own rule has a test")
         self.verified("clear_emergency", emergency_id=self.robot()["emergency_id"])
         self.assertEqual((self.robot()["mode"], self.robot()["setpoint_m"]), ("manual", None))
         self.assert_nothing_moves(stopped["effect_at_robot_us"])
 
-        with self.assertRaises(ApiError) as refused:
-            station.command("cart-1", "set_parameter", name="kp", value=1)
-        self.assertEqual(refused.exception.reason, "unsupported")
-        station.command("cart-1", "zero_position")
+        self.assertEqual(self.refusal("set_parameter", name="kp", value=1), "unsupported")
+        commanded(station, "zero_position", "cart-1")
         wait_until(lambda: abs(self.robot()["sample"]["position_m"]) < 0.005, PATIENCE_S, "its place is the new 0")
         self.assert_all_is_recorded()
         robot.send_signal(signal.SIGTERM)
@@ -204,31 +217,31 @@ class ExampleRobotTest(unittest.TestCase):
         station = self.started()
         robot = self.start_robot(station.endpoints["robots"])
         boot = self.robot()["boot_id"]
-        station.post("/api/v1/robots/cart-1/emergency-stop")
+        self.verified("set_mode", mode="auto", setpoint_m=1.0)
+        self.stopped()
         robot.kill()
         robot.wait()
         self.start_robot(station.endpoints["robots"])
-        again = wait_until(lambda: self.robot()["mode"] == "emergency" and self.robot()["boot_id"] != boot, PATIENCE_S,
-                           "it is latched in its new boot")
-        self.assertTrue(again)
+        wait_until(lambda: self.robot()["mode"] == "emergency" and self.robot()["boot_id"] != boot, PATIENCE_S,
+                   "it is latched in its new boot")
+        self.assertEqual(self.refusal("set_duty", duty=0.5), "latched")
+        self.verified("clear_emergency", emergency_id=self.robot()["emergency_id"])
         self.assert_nothing_moves(0)
+        self.verified("set_duty", duty=0.5)
 
     def test_a_robot_that_has_less(self):
         station = self.started()
         self.start_robot(station.endpoints["robots"], program=("-c", LESS, EXAMPLES))
-        self.assertIsNone(self.robot()["stop_path"])
         for part, content in (("parameters", "parameters"), ("controller", "controller")):
             self.assertIsNone(station.get(f"/api/v1/robots/cart-1/{part}")[content])
         self.verified("set_duty", duty=0.3)
-        with self.assertRaises(ApiError) as refused:
-            station.command("cart-1", "set_mode", mode="auto", setpoint_m=0.1)
-        self.assertEqual(refused.exception.reason, "unsupported")
+        self.assertEqual(self.refusal("set_mode", mode="auto", setpoint_m=0.1), "unsupported")
         self.assertIn("is aborted: zero_position: rejected unsupported", self.experiment().stdout)
-        stopped = station.post("/api/v1/robots/cart-1/emergency-stop")
-        self.verified("clear_emergency", emergency_id=stopped["emergency_id"])
+        stopped = self.stopped()
+        self.verified("clear_emergency", emergency_id=self.robot()["emergency_id"])
         self.verified("set_mode", mode="manual")
         self.assert_nothing_moves(stopped["effect_at_robot_us"])
-        self.assertIsNone(self.robot()["status"])
+        self.assertEqual((self.robot()["status"], self.robot()["stop_path"]), (None, None))
         self.assert_all_is_recorded()
 
     def experiment(self):
@@ -241,6 +254,9 @@ class ExampleRobotTest(unittest.TestCase):
             done = self.experiment()
             if done.returncode == 0:
                 break
+            self.verified("set_mode", mode="auto", setpoint_m=0.0)  # back, since each of them goes on where it stands
+            wait_until(lambda: abs(self.robot()["sample"]["position_m"]) < 0.01, PATIENCE_S, "it is back")
+            self.verified("set_mode", mode="manual")
         self.assertIn("is done", done.stdout, done.stderr)
         wait_until(lambda: station.get(f"/api/v1/runs/{run}/certificate")["final"], PATIENCE_S, "all of the run on disk")
         self.assertEqual(station.get(f"/api/v1/runs/{run}/certificate")["samples_lost"], 0)
@@ -262,12 +278,69 @@ class ExampleRobotTest(unittest.TestCase):
                 self.assertIn(b"cart-1", first.recv(1024), "and the first connection was one of the robot's, too")
         wait_until(lambda: "no answer" in self.place.log("cart-1"), PATIENCE_S, "it says so")
 
+    def taken_below(self, server_tls=None, **tls):
+        """How many bytes a connection to a station that reads nothing takes, before what follows waits in its order."""
+        async def fill(link):
+            _, writer = await link.dial()
+            taken = 0
+            while writer.transport.get_write_buffer_size() == 0:
+                writer.write(bytes(1000))
+                taken += 1000
+            writer.transport.abort()
+            return taken
+        ends = threading.Event()
+        with socket.socket() as listener:
+            listener.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+            listener.bind(("127.0.0.1", 0))
+            listener.listen()
+
+            def hang():
+                peer, _ = listener.accept()
+                with server_tls.wrap_socket(peer, server_side=True) if server_tls else peer:
+                    ends.wait(PATIENCE_S)
+            station = threading.Thread(target=hang)
+            station.start()
+            try:
+                return asyncio.run(fill(StationLink(None, "localhost", listener.getsockname()[1], **tls)))
+            finally:
+                ends.set()
+                station.join()
+
+    def test_buffers_below_take_little_ahead_of_the_answer_to_a_stop(self):
+        with lab() as place:
+            place.tool("certificate", "--data", place.data)
+            certificate = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+            certificate.load_cert_chain(place.data / "tls" / "station.crt", place.data / "tls" / "station.key")
+            trust = ssl.create_default_context(cafile=place.data / "tls" / "lab-ca.crt")
+            self.assertLess(self.taken_below(), 30_000)
+            self.assertLess(self.taken_below(certificate, tls=trust), 30_000)
+
     def other_authority(self):
         with lab() as other:
             self.assertEqual(other.tool("certificate", "--data", other.data).returncode, 0)
             copy = self.place.folder / "other-ca.crt"
             copy.write_bytes((other.data / "tls" / "lab-ca.crt").read_bytes())
         return copy
+
+    def test_it_ends_in_order_when_its_terminal_is_closed_unless_nohup_has_it_go_on(self):
+        self.started()
+        for prefix, status in (((), 0), (("/usr/bin/nohup",), None)):
+            robot = self.place._start("ends", *prefix, sys.executable, "-B", EXAMPLES / "robot.py", "--id", "ends",
+                                      "--station", self.station.endpoints["robots"])
+            self.station.wait_for_robot("ends", PATIENCE_S)
+            robot.send_signal(signal.SIGHUP)
+            if status is None:
+                seen = self.station.robot("ends")["next_seq"]
+                wait_until(lambda: self.station.robot("ends")["next_seq"] > seen + 50, PATIENCE_S, "it goes on")
+                robot.send_signal(signal.SIGINT)
+            self.assertEqual(robot.wait(timeout=PATIENCE_S), 0)
+
+    def test_it_sends_no_token_in_clear_text_to_another_machine(self):
+        with tempfile.NamedTemporaryFile() as token:
+            refused = subprocess.run([sys.executable, "-B", EXAMPLES / "robot.py", "--station", "lab-pc.local:7070",
+                                      "--token-file", token.name], capture_output=True, text=True, timeout=PATIENCE_S)
+        self.assertEqual(refused.returncode, 2)
+        self.assertIn("could read the token", refused.stderr)
 
     def test_over_tls_with_a_token(self):
         with lab() as place:
@@ -287,6 +360,7 @@ class ExampleRobotTest(unittest.TestCase):
                                          ("deceived", "CERTIFICATE_VERIFY_FAILED", ("--tls-ca", self.other_authority()))):
                 self.begin_robot(address, *flags, robot_id=robot_id)
                 wait_until(lambda: why in place.log(robot_id), PATIENCE_S, f"'{why}' of {robot_id}")
+            for robot_id in ("stranger", "plain", "deceived"):
                 self.assertNotIn("connected to", place.log(robot_id))
 
 
