@@ -117,7 +117,7 @@ TEST_F(PrivateFile, LinksThatArePlantedBesideTheDatabaseAreNotFollowed) {
   VirtualClock clock{loop};
   {
     config::DataFolder data{folder};
-    runtime::run_first(loop, data.announce(clock, {"127.0.0.1:1", "127.0.0.1:2", ""}));
+    runtime::run_first(loop, data.announce(clock, {"127.0.0.1:1", "127.0.0.1:2", "", ""}));
     EXPECT_TRUE(fs::is_regular_file(fs::symlink_status(folder / "endpoints.json")));
   }
   std::string content;
