@@ -9,6 +9,15 @@ from processes import lab
 
 class ExperimentTest(unittest.TestCase):
     def test_the_measured_experiment_meets_its_bounds_and_the_prediction(self):
+        for tries_left in (2, 1, 0):
+            try:
+                return self.measure()
+            except RuntimeError as left:  # a machine that stands still loses the link, and with it the mode auto
+                if tries_left == 0:
+                    raise
+                print(f"again: {left}")
+
+    def measure(self):
         with lab() as place:
             station = place.start_station()
             truth = Truth(place.folder / "truth.csv")
