@@ -100,7 +100,8 @@ const steps = {
 
   async 'and goes when telemetry shows the latch'() {
     bench.station.process.kill('SIGCONT');
-    await until('the page sees the latch', async () => (await phase()) === 'seen');
+    // By telemetry, or by the answer of the press, which the page sends again.
+    await until('the page sees the latch', async () => ['seen', 'stopped'].includes(await phase()));
     assert.equal(await mode(), 'emergency');
     await until('its motor is off', async () => (await robot()).sample.duty === 0);
     await live();
