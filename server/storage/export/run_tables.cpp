@@ -62,8 +62,10 @@ constexpr Copy kCopies[] = {
      " FROM store.run_span CROSS JOIN store.boot USING (boot_key) CROSS JOIN store.clock_estimate USING (boot_key)"
      " WHERE run_id = {0} AND robot_time_us >= coalesce((SELECT max(robot_time_us) FROM store.clock_estimate AS before"
      " WHERE before.boot_key = run_span.boot_key AND before.robot_time_us <= (SELECT first_robot_time_us"
-     " FROM store.segment WHERE segment.boot_key = run_span.boot_key AND segment.first_seq >= run_span.first_seq - 99"
-     " ORDER BY segment.first_seq LIMIT 1)), 0) AND robot_time_us <= (SELECT first_robot_time_us"
+     " + max(run_span.first_seq - segment.first_seq, 0) * period_us FROM store.segment"
+     " WHERE segment.boot_key = run_span.boot_key AND segment.first_seq >= run_span.first_seq - 99"
+     " AND segment.last_seq >= run_span.first_seq ORDER BY segment.first_seq LIMIT 1)), 0) AND robot_time_us <= "
+     "(SELECT first_robot_time_us"
      " + (segment.last_seq - segment.first_seq) * period_us FROM store.segment"
      " WHERE segment.boot_key = run_span.boot_key AND segment.first_seq <= coalesce(run_span.last_seq,"
      " 9223372036854775807) ORDER BY segment.first_seq DESC LIMIT 1)"},

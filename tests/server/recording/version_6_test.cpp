@@ -27,6 +27,13 @@ std::vector<std::string> lines_of(const std::string& text) {
   return lines;
 }
 
+// A line of CSV without `t_s`, the fifth field, which exports have had since.
+std::string without_t_s(const std::string& line) {
+  std::size_t from = 0;
+  for (int field = 0; field < 4; ++field) from = line.find(',', from) + 1;
+  return line.substr(0, from) + line.substr(line.find(',', from) + 1);
+}
+
 class Version6Test : public RecordingTest {
  protected:
   void SetUp() override { make_database(path_, "version_6.sql"); }
@@ -101,7 +108,7 @@ TEST_F(Version6Test, TheExportsOfARunSayTheSame) {
   const std::vector<std::string> now = lines_of(content_of(exported(cli::ExportFormat::csv)));
   ASSERT_EQ(now.size(), then.size());
   ASSERT_EQ(now.size(), 172U);
-  for (std::size_t line = 0; line < now.size(); ++line) EXPECT_THAT(now[line], StartsWith(then[line]));
+  for (std::size_t line = 0; line < now.size(); ++line) EXPECT_THAT(without_t_s(now[line]), StartsWith(then[line]));
 
   const fs::path earlier = folder_ / "earlier.sqlite";
   make_database(earlier, "version_6_run_1.sql");
