@@ -33,9 +33,10 @@ RESTORED = "a database that was restored from a backup"
 LENGTH = f"more than {LONGEST} actions, or {MOST_STOPS} stops and connections"
 UNKNOWN = "a command that the killed station had not stored"
 LOST_EVENTS = "events of the robot that were lost"
+NO_EVENTS = "a robot that reports no events"
 REPLAYED = "a simulated robot that replays a recording"
 NOT_IN_THE_MODEL = (SCHEDULE, TIMED, EXPERIMENT, UNANSWERED, LINK_LOSS, OPERATORS, RESTORED, LENGTH, UNKNOWN, LOST_EVENTS,
-                    REPLAYED)
+                    NO_EVENTS, REPLAYED)
 
 
 class NotInTheModel(Exception):
@@ -113,6 +114,11 @@ class Record:
             return command["effect_at_robot_us"]
         return self.reported.get(command["command_id"])
 
+    def shows_its_stops(self):
+        """False: it has obeyed a stop, and no event of it is there. A robot need not report events."""
+        has_stopped = any(each["kind"] == "emergency_stop" and each["effect_at_robot_us"] for each in self.commands)
+        return not has_stopped or any(each["event_seq"] is not None for each in self.events)
+
     def may_have_run(self, command):
         is_open = command["state"] in ("queued", "sent", "unknown") or command["kind"] == "emergency_stop"
         return is_open or bool(command["effect_at_robot_us"]) or self.ran_at_us(command) is not None
@@ -134,6 +140,8 @@ def trace_of(record):
             raise NotInTheModel(REPLAYED)
         if record.has_lost_events:
             raise NotInTheModel(LOST_EVENTS)
+        if not record.shows_its_stops():
+            raise NotInTheModel(NO_EVENTS)
         station, tenures, left_out = of_station(record)
         return Trace(of_robot(record, tenures), station, left_out)
     except NotInTheModel as reason:

@@ -151,6 +151,10 @@ class RecordedTest(unittest.TestCase):
         self.robot.has_lost_events = True
         self.has_no_trace(recorded.LOST_EVENTS)
 
+    def test_a_robot_without_events(self):
+        self.robot.command("emergency_stop")
+        self.has_no_trace(recorded.NO_EVENTS)
+
     def test_a_replay(self):
         self.robot.is_a_replay = True
         self.has_no_trace(recorded.REPLAYED)
