@@ -255,12 +255,17 @@ class StationLink:
 
     async def keep_ticking(self):
         while True:
-            due_us = self.robot.ticked_us + PERIOD_US
-            await asyncio.sleep((due_us - self.robot.now_us()) / 1e6)
-            # A multiple of the period, also after a standstill; what was missed then is not caught up.
-            self.robot.step(max(due_us, self.robot.now_us() // PERIOD_US * PERIOD_US))
-            if self.connection:
-                self.connection.on_tick()
+            await asyncio.sleep((self.robot.ticked_us + PERIOD_US - self.robot.now_us()) / 1e6)
+            self.tick_if_due()
+
+    def tick_if_due(self):
+        due_us, now_us = self.robot.ticked_us + PERIOD_US, self.robot.now_us()
+        if now_us < due_us:
+            return
+        # A multiple of the period, also after a standstill; what was missed then is not caught up.
+        self.robot.step(max(due_us, now_us // PERIOD_US * PERIOD_US))
+        if self.connection:
+            self.connection.on_tick()
 
     async def stay_connected(self):
         while True:
@@ -280,6 +285,7 @@ class StationLink:
             self.connection = Connection(self.robot, reader, writer)
             while True:
                 frame = await from_network(self.connection.receive(), None if self.connection.is_welcome else deadline_s)
+                self.tick_if_due()  # a sample that is late shows no command of after its time
                 self.connection.on_frame(frame, self.robot.now_us())
                 if frame.HasField("welcome"):
                     self.say(f"connected to {self.host}:{self.port} as {self.robot.robot_id}")
