@@ -3,14 +3,12 @@
 import { signal } from '@preact/signals';
 import { h, render, type ComponentType } from 'preact';
 import { afterEach, beforeEach, expect, test, vi } from 'vitest';
-import type { RobotState } from '../src/api';
 import type { ExperimentSummary } from '../src/experiments_store';
 import { GamepadLine } from '../src/parts/gamepad_line';
 import { AlertLine, alerts_of, thresholds } from '../src/parts/threshold_list';
 import { resting_place, Vessel } from '../src/parts/vessel';
 import { route } from '../src/route';
 import { Session } from '../src/session';
-import { Store } from '../src/store';
 import { Coast } from '../src/vessel/coast';
 import { ActsOfOne } from '../src/views/experiments/acts_of_one';
 import { OneExperiment } from '../src/views/experiments/one';
@@ -18,7 +16,7 @@ import { state_word } from '../src/views/runs/list_view';
 import { State } from '../src/views/runs/run_view';
 import { link_word } from '../src/views/station/robots';
 import { fake_document, FakeNode } from './fake_dom';
-import { batch } from './fakes';
+import { batch, robot, store_with } from './fakes';
 
 const pages: FakeNode[] = [];
 let listeners: Record<string, (event: object) => void> = {};
@@ -42,28 +40,6 @@ afterEach(async () => {
   vi.useRealTimers();
   route.value = { view: 'robot', parts: [], query: {} };
 });
-
-const robot = (robot_id: string, change: object = {}) =>
-  ({
-    robot_id,
-    link: 'connected',
-    mode: 'manual',
-    emergency_id: null,
-    pending_stop: null,
-    control: null,
-    reservation: null,
-    clock: null,
-    ...change,
-  }) as unknown as RobotState;
-
-function store_with(...robots: RobotState[]) {
-  const clock = { page: 0 };
-  const store = new Store({ page_ms: () => clock.page, utc_ms: () => 0 });
-  store.receive({ type: 'welcome', actor: 'session:1', version: '', utc_us: 0, stamp_us: 0, robots });
-  store.is_current.value = true;
-  store.refresh();
-  return { store, clock };
-}
 
 // What it has drawn, and drawn again after a signal has changed.
 function drawn<P>(part: ComponentType<P>, props: P) {
@@ -255,7 +231,7 @@ test('an experiment that goes on selects its robot for the stop when it is opene
   expect(store.selected_id.value).toBe('b');
 });
 
-test('that a robot is connected, or a run open, is only said while the page hears it', () => {
+test('that a robot is connected, or a run open, is only said while the page is connected', () => {
   const { store } = store_with(robot('a'), robot('gone', { link: 'disconnected' }));
   const words = (is_current: boolean) =>
     ['a', 'gone', 'none'].map((robot_id) => link_word(store.find(robot_id), is_current));

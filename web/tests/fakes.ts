@@ -1,7 +1,8 @@
 // What the tests hand in instead of time, timers, sockets and the station.
 
-import type { LiveMessage, SamplesMessage } from '../src/api';
+import type { LiveMessage, RobotState, SamplesMessage } from '../src/api';
 import type { Socket, Surroundings } from '../src/live';
+import { Store } from '../src/store';
 
 // Time that moves only when it is advanced; timers run in their order.
 export class FakeTime {
@@ -114,4 +115,28 @@ export function batch(first_seq: number, size: number, change: Partial<SamplesMe
     reference_m: column(() => 0.1),
     ...change,
   };
+}
+
+// A connected robot that nobody controls, at rest.
+export const robot = (robot_id: string, change: object = {}) =>
+  ({
+    robot_id,
+    link: 'connected',
+    mode: 'manual',
+    emergency_id: null,
+    pending_stop: null,
+    control: null,
+    reservation: null,
+    clock: null,
+    ...change,
+  }) as unknown as RobotState;
+
+// A store that the station has welcomed, and the page's clock.
+export function store_with(...robots: RobotState[]) {
+  const clock = { page: 0 };
+  const store = new Store({ page_ms: () => clock.page, utc_ms: () => 0 });
+  store.receive({ type: 'welcome', actor: 'session:1', version: '', utc_us: 0, stamp_us: 0, robots });
+  store.is_current.value = true;
+  store.refresh();
+  return { store, clock };
 }

@@ -3,12 +3,10 @@
 import { readFileSync } from 'node:fs';
 import { effect } from '@preact/signals';
 import { afterEach, beforeEach, expect, test, vi } from 'vitest';
-import type { RobotState } from '../src/api';
 import { route } from '../src/route';
 import { Session } from '../src/session';
-import { Store } from '../src/store';
 import { DesignApi } from '../src/views/design/design_api';
-import { FakeSurroundings } from './fakes';
+import { FakeSurroundings, robot, store_with } from './fakes';
 
 afterEach(() => {
   vi.unstubAllGlobals();
@@ -19,28 +17,6 @@ beforeEach(() => {
   vi.useFakeTimers();
   vi.stubGlobal('document', { addEventListener: () => undefined });
 });
-
-const robot = (robot_id: string, change: object = {}) =>
-  ({
-    robot_id,
-    link: 'connected',
-    mode: 'manual',
-    emergency_id: null,
-    pending_stop: null,
-    control: null,
-    reservation: null,
-    clock: null,
-    ...change,
-  }) as unknown as RobotState;
-
-function store_with(...robots: RobotState[]) {
-  const clock = { page: 0 };
-  const store = new Store({ page_ms: () => clock.page, utc_ms: () => 0 });
-  store.receive({ type: 'welcome', actor: 'session:1', version: '', utc_us: 0, stamp_us: 0, robots });
-  store.is_current.value = true;
-  store.refresh();
-  return { store, clock };
-}
 
 // ---- what only changes the picture
 

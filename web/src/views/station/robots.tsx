@@ -186,7 +186,7 @@ interface RowProps {
   on_enrol(robot_id: string): void;
 }
 
-// SAFETY: that a robot is connected is only said while the page hears it.
+// SAFETY: that a robot is connected is only said while the page is connected.
 export function link_word(known: Robot | undefined, is_current: boolean): string {
   if (!known) return 'never seen';
   if (known.is_away.value) return 'away';
