@@ -277,6 +277,8 @@ class Robot:
 
     def store(self, command, now_us):
         check(self.mode != pb.MODE_EMERGENCY, "latched")
+        # SAFETY: a lease is renewed by a sender who is there now, never by one who was there when it was sent.
+        check(not command.HasField("renew_lease"), "malformed")
         if now_us >= self.timed_until_us:  # SAFETY: what has outlived its lease is not revived by another
             self.drop_timed("expired")
         check(len(self.timed) < MAX_TIMED, "busy")

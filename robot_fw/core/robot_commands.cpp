@@ -33,6 +33,10 @@ void Robot::on_command(const protocol::Command& command) {
   if (safety_.latched() && !runs_when_latched(command)) {
     return answer(command.command_id, rejected(rheonaut_REJECT_REASON_LATCHED));
   }
+  // SAFETY: a lease is renewed by a sender who is there now, never by one who was there when it was sent.
+  if (command.which_action == rheonaut_Command_renew_lease_tag) {
+    return answer(command.command_id, rejected(rheonaut_REJECT_REASON_MALFORMED));
+  }
   // SAFETY: what lapsed since the last tick stays lapsed; a new one would begin its lease anew.
   if (timed_.lease_lapsed(now_us_)) drop_timed_commands(kTimedExpired);
   if (!timed_.hold(command, now_us_)) return answer(command.command_id, rejected(rheonaut_REJECT_REASON_BUSY));

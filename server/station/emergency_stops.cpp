@@ -3,12 +3,14 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <string_view>
 
 namespace server::station {
 namespace {
 
 constexpr microseconds kRepeatStop{1'000'000};
 constexpr microseconds kSamePress{10'000'000};
+constexpr std::string_view kStop = "emergency_stop";  // of a record
 constexpr std::size_t kMaxStops = 16;  // on their way to one robot; who asks for more waits for the newest of them
 constexpr microseconds kMayStillMove{60'000'000};  // twice the longest that a robot goes on without its link
 
@@ -42,9 +44,9 @@ std::shared_ptr<PendingCommand> EmergencyStops::begin(RobotEntry& entry, const S
   request.actor = stop_request.actor;
   request.peer = stop_request.peer;
   request.received_us = stop_request.received_us;
-  // SAFETY: a key that has been used is no reason not to stop again.
+  // SAFETY: a key that has been used, by a command of any kind, is no reason not to stop.
   const CommandId id = command_id_of(entry.robot.id, stop_request.actor, stop_request.key);
-  if (!recent_.find(id)) request.key = stop_request.key;
+  if (!recent_.find(id) && !entry.commands.find_unanswered(id)) request.key = stop_request.key;
   const auto stop = make(entry, request);
   stop->is_timed = entry.link != nullptr;
   hand(entry, *stop, to_publish);  // SAFETY: the frame first, the record afterwards
@@ -63,15 +65,15 @@ std::shared_ptr<PendingCommand> EmergencyStops::make(RobotEntry& entry, const Co
   return stop;
 }
 
-// The stop that answers the request already; null when a new one is needed. SAFETY: only one that came with the same
+// The stop that answers the request already; null when a new one is needed. SAFETY: only a stop that came with the same
 // key within 10 s and still latches the robot; or the newest, when the robot is away or has as many as it can be given.
 std::shared_ptr<PendingCommand> EmergencyStops::stop_in_force(RobotEntry& entry, const StopRequest& request) {
   if (!request.key.empty()) {
     const CommandId id = command_id_of(entry.robot.id, request.actor, request.key);
-    if (auto unanswered = entry.commands.find_unanswered(id)) return unanswered;
+    if (auto same = entry.commands.find_unanswered(id); same != nullptr && same->is_stop()) return same;
     const auto* recent = recent_.find(id);
-    const bool is_same_press =
-        recent != nullptr && entry.robot.latched() && clock_.steady_us() - recent->answered_us < kSamePress.count();
+    const bool is_same_press = recent != nullptr && recent->record.kind == kStop && entry.robot.latched() &&
+                               clock_.steady_us() - recent->answered_us < kSamePress.count();
     if (is_same_press) return answered_before(loop_, recent->record);
   }
   const auto newest = entry.commands.newest_stop();

@@ -167,6 +167,14 @@ TEST_F(Waiting, LivesOnWhileItIsRenewed) {
   EXPECT_EQ(core().duty(), 0.5F);
 }
 
+// SAFETY: renewals that were sent ahead would keep a motor on for as long as they reach.
+TEST_F(Waiting, IsNotRenewedByARenewalThatWaitsItself) {
+  order(sim_robot::set_duty(0.2F));
+  EXPECT_EQ(answer(sim_robot::timed(sim_robot::renew_lease(), robot.robot_time_us() + 49 * kTickUs)), "malformed");
+  station.run(60);
+  expect_at_rest();
+}
+
 TEST_F(Waiting, IsRenewedInAutoToo) {
   order(sim_robot::set_auto(0.01F));
   EXPECT_EQ(answer(sim_robot::renew_lease()), "nothing_to_renew");

@@ -105,6 +105,13 @@ class TimedTest(Orders):
         self.assertEqual(self.later_answers(), [(late.command_id, "expired")])
         self.assertAlmostEqual(self.robot.setpoint_m, 0.1)
 
+    def test_a_renewal_cannot_wait(self):
+        self.answer(self.duty(0.3))
+        ahead = self.command(renew_lease=pb.RenewLease(), execute_at_robot_us=self.now_us + 490_000)
+        self.assertEqual(self.answer(ahead), "malformed")
+        self.run_for(600_000)
+        self.assertEqual(self.robot.cart.duty, 0.0)
+
     def test_a_lapsed_one_is_not_revived_between_two_ticks(self):
         old = self.store(after_us=600_000)
         self.now_us += 500_000

@@ -118,6 +118,32 @@ TEST_F(ExperimentSafetyTest, APauseBeforeItMovesKeepsItFromMoving) {
   until(id, ExperimentState::done);
 }
 
+TEST_F(ExperimentSafetyTest, APauseAtTheEndOfARunHoldsTheNextOne) {
+  const char* kShort = "kind = \"duty\"\nduty = 0.2\nfor_s = 2";
+  const auto id = start(profile({kShort}, "[sweep]\nrepeats = 2\n"));
+  ASSERT_TRUE(clock.run_until([&] { return duty() != 0; }, 5s));
+  ASSERT_TRUE(clock.run_until([&] { return duty() == 0; }, 5s));
+  const auto rest = [&] { return view(id).progress && view(id).progress->elapsed_s >= 2; };
+  ASSERT_TRUE(clock.run_until(rest, 1s)) << "the line is over, and the robot is brought to rest";
+  ASSERT_TRUE(wait_for(experiments->pause(id, {"boris", "", 0})));
+  clock.run_for(8s);
+  EXPECT_EQ(until(id, ExperimentState::paused).reason, "requested");
+  EXPECT_EQ(duty(), 0);
+  EXPECT_EQ(view(id).experiment.runs.size(), 1U) << "the next one has not begun";
+  ASSERT_TRUE(wait_for(experiments->resume(id, {"anna", "", 0})));
+  until(id, ExperimentState::done);
+}
+
+// Its ticks are those of another length: a profile would play slower or faster, and its lease end too late.
+TEST_F(ExperimentSafetyTest, ARobotWithAnotherSamplePeriodIsNotMoved) {
+  come("anna");
+  const_cast<station::RobotState&>(state()).sample_period_us = 20'000;
+  const auto id = enqueue(profile({kLongDuty}));
+  clock.run_for(8s);
+  EXPECT_EQ(view(id).waits_for, "sample_period");
+  EXPECT_EQ(duty(), 0);
+}
+
 TEST_F(ExperimentSafetyTest, APersonsPauseOutlivesThatOfAnAbsentPage) {
   const auto id = start(profile({kLongDuty}));
   clock.run_for(1s);

@@ -6,7 +6,6 @@
 namespace server::experiments {
 namespace {
 
-constexpr std::uint64_t kTickUs = 10'000;
 constexpr std::size_t kMostEntries = std::size(rheonaut_SetDutySchedule{}.duty);
 
 }  // namespace

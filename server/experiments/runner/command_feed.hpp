@@ -17,6 +17,7 @@
 
 namespace server::experiments {
 
+inline constexpr std::uint64_t kTickUs = 10'000;  // kTick_s
 inline constexpr std::uint64_t kLookAheadUs = 400'000;
 inline constexpr std::uint64_t kGraceUs = 100'000;  // after its time a command that comes late still runs
 inline constexpr std::size_t kMostWaiting = 3;      // commands on the robot; it holds four

@@ -199,6 +199,8 @@ asio::awaitable<DriveEnd> Conduct::drive(TimeLine line) {
   driver_ = std::make_unique<RunDriver>(parts_.driver, std::move(request), profile_.abort, std::move(line));
   DriveEnd end = co_await driver_->run();
   begins_ = driver_->step_begins();
+  // SAFETY: a pause that came while the robot was brought to rest holds the next run.
+  if (const Abort* why = driver_->pause_reason(); why != nullptr && !is_resumed_) waiting_for_ = *why;
   driver_.reset();
   co_return end;
 }
@@ -223,8 +225,8 @@ asio::awaitable<void> Conduct::end_recording() {
 
 // SAFETY: also between runs, and before the first one: then nothing moves until it is resumed.
 void Conduct::pause(Abort why) {
-  if (driver_) return driver_->pause(std::move(why.reason), std::move(why.detail));
   is_resumed_ = false;
+  if (driver_) return driver_->pause(std::move(why.reason), std::move(why.detail));
   if (!waiting_for_) waiting_for_ = std::move(why);
 }
 

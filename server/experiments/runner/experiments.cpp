@@ -93,6 +93,11 @@ Experiments::WaitReason Experiments::wait_reason_of(const Entry& entry) const {
   if (robot == nullptr || robot->link != station::LinkState::connected || !robot->sample) {
     return {"robot_not_connected", "the robot is not connected"};
   }
+  // SAFETY: the duties of a profile are counted in ticks; with longer ones the motor would be on for longer.
+  if (robot->sample_period_us != kTickUs) {
+    return {"sample_period", fmt::format("the robot has a sample period of {} µs, and experiments are for {} µs",
+                                         robot->sample_period_us, kTickUs)};
+  }
   if (entry.is_unreadable) return {"unreadable", "this version cannot read its profile; cancel it"};
   // SAFETY: the administrator may have changed their mind since it was queued.
   if (experiment.request.is_unattended && !allow_unattended_) {

@@ -279,10 +279,13 @@ asio::awaitable<void> RunDriver::stay_paused() {
   const std::size_t broken_off = feed_.step_at(robot_now_us(robot));
   begin_generation();
   Rest resting = co_await rest();
-  while (!abort_ && !is_over_pause(*parts_.station.find(request_.robot_id))) {
-    co_await changed_.wait_until(parts_.clock, parts_.clock.steady_us() + kTurn.count());
+  for (;;) {
+    while (!abort_ && !is_over_pause(*parts_.station.find(request_.robot_id))) {
+      co_await changed_.wait_until(parts_.clock, parts_.clock.steady_us() + kTurn.count());
+    }
+    if (abort_ || resting != Rest::of_another) break;
+    resting = co_await rest();  // it is ours again; SAFETY: a pause that comes meanwhile holds it
   }
-  if (!abort_ && resting == Rest::of_another) resting = co_await rest();  // it is ours again
   if (!abort_ && resting != Rest::at_rest) abort({"emergency", "the robot is in emergency"});
   if (!abort_ && ++repeats_ > kMostRepeats) {
     abort({"too_many_repeats", fmt::format("steps were broken off {} times", repeats_)});

@@ -72,6 +72,9 @@ bool is_superseded_by(const PendingCommand& older, const protocol::Command& newe
   const auto kind = newer.which_action;
   if (kind != rheonaut_Command_set_setpoint_tag && kind != rheonaut_Command_set_duty_tag) return false;
   if (newer.has_execute_at_robot_us || older.wire.has_execute_at_robot_us) return false;  // each at its time
+  // SAFETY: a duty of 0 also cancels the timed commands that wait in the robot, which a later duty would not.
+  const auto is_halt = [](const protocol::Command& command) { return command.action.set_duty.duty == 0; };
+  if (kind == rheonaut_Command_set_duty_tag && is_halt(older.wire) && !is_halt(newer)) return false;
   return older.record.state == CommandState::queued && older.wire.which_action == kind;
 }
 

@@ -85,24 +85,30 @@ std::uint64_t BootStore::latch_of(const station::RobotId& robot_id) {
   return 0;
 }
 
-// A change of the latch is an event and begins a new segment: the later of the two counts. A stop's event is
-// the earlier one where its samples have arrived, and the only one where they have not.
+// A change of the latch is an event and begins a new segment, and a stop has its own record: the latest of them counts.
+// SAFETY: the record is on disk first, and of a robot that sends no events its segment comes only a second later.
 std::optional<std::uint64_t> BootStore::last_emergency(std::int64_t boot_key) {
+  SQLite::Statement segment{database_.handle(),
+                            "SELECT first_robot_time_us, emergency_id FROM segment"
+                            " WHERE boot_key = ? ORDER BY first_seq DESC LIMIT 1"};
   SQLite::Statement event{database_.handle(),
                           "SELECT robot_time_us, iif(kind = 'emergency', emergency_id, 0) FROM event"
                           " WHERE boot_key = ? AND event_seq IS NOT NULL AND kind IN ('emergency', 'emergency_cleared')"
                           " ORDER BY event_seq DESC LIMIT 1"};
-  SQLite::Statement segment{database_.handle(),
-                            "SELECT first_robot_time_us, emergency_id FROM segment"
-                            " WHERE boot_key = ? ORDER BY first_seq DESC LIMIT 1"};
-  bind_all(event, boot_key);
-  bind_all(segment, boot_key);
-  const bool has_event = event.executeStep();
-  const bool has_segment = segment.executeStep();
-  const bool event_is_later =
-      has_event && (!has_segment || event.getColumn(0).getInt64() >= segment.getColumn(0).getInt64());
-  if (event_is_later) return unsigned_id(event.getColumn(1));
-  return has_segment ? std::optional{unsigned_id(segment.getColumn(1))} : std::nullopt;
+  SQLite::Statement stop{database_.handle(),  // of the newest commands, since older ones have their segment
+                         "SELECT effect_at_robot_us, emergency_id FROM (SELECT command.* FROM command JOIN boot"
+                         " USING (robot_id) WHERE boot_key = ?1 ORDER BY submitted_at_us DESC LIMIT 100)"
+                         " WHERE boot_id = (SELECT boot_id FROM boot WHERE boot_key = ?1) AND kind = 'emergency_stop'"
+                         " AND effect_at_robot_us > 0 ORDER BY effect_at_robot_us DESC LIMIT 1"};
+  std::optional<std::uint64_t> latch;
+  std::int64_t known_at_robot_us = 0;
+  for (SQLite::Statement* query : {&segment, &event, &stop}) {
+    bind_all(*query, boot_key);
+    if (!query->executeStep() || query->getColumn(0).getInt64() < known_at_robot_us) continue;
+    known_at_robot_us = query->getColumn(0).getInt64();
+    latch = unsigned_id(query->getColumn(1));
+  }
+  return latch;
 }
 
 std::int64_t BootStore::next_boot_key() {

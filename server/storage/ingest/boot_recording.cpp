@@ -104,10 +104,11 @@ std::size_t BootRecording::count_new(const station::SampleBatch& batch) const {
   return count(received_.missing({batch.first_seq, batch.next_seq()}));
 }
 
-void BootRecording::append(const station::SampleBatch& batch, std::int64_t steady_us) {
+void BootRecording::append(const station::SampleBatch& batch, std::uint64_t robot_now_us, std::int64_t steady_us) {
   const auto time_us = batch.first_robot_time_us + (batch.samples.size() - 1) * batch.context.period_us;
   next_seq_ = std::max(next_seq_, batch.next_seq());
-  last_robot_time_us_ = std::max(last_robot_time_us_, time_us);
+  // A sample may say a time that its robot's clock has not reached; the robot may all the same connect again.
+  last_robot_time_us_ = std::max(last_robot_time_us_, std::min(time_us, robot_now_us));
   if (waiting_.empty()) waiting_since_us_ = steady_us;
   const Interval samples{batch.first_seq, batch.next_seq()};
   if (received_.extend(samples)) return append_part(batch, samples, steady_us);
@@ -230,7 +231,8 @@ void BootRecording::move_gaps(WriteBatch& batch) {
 
 void BootRecording::set_committed(const Segment& segment) {
   if (!committed_.extend(segment.interval())) committed_.insert(segment.interval());
-  committed_robot_time_us_ = std::max(committed_robot_time_us_, segment.robot_time_us(segment.samples.size() - 1));
+  const std::uint64_t time_us = std::min(segment.robot_time_us(segment.samples.size() - 1), last_robot_time_us_);
+  committed_robot_time_us_ = std::max(committed_robot_time_us_, time_us);
 }
 
 BootProgress BootRecording::progress() const {

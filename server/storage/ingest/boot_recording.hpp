@@ -48,8 +48,8 @@ class BootRecording {
 
   // Samples of the batch that are not here yet.
   std::size_t count_new(const station::SampleBatch& batch) const;
-  // Adds them to the waiting segments.
-  void append(const station::SampleBatch& batch, std::int64_t steady_us);
+  // Adds them to the waiting segments. `robot_now_us`: the robot's clock as its frames show it.
+  void append(const station::SampleBatch& batch, std::uint64_t robot_now_us, std::int64_t steady_us);
   // There is no room: the samples stay missing and are asked for again.
   void refuse(const station::SampleBatch& batch);
   // The robot no longer holds what is missing below.

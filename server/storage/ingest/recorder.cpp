@@ -229,7 +229,7 @@ void Recorder::start(BootEntry& boot) {
   queue_->enqueue_start(boot, std::move(started.start));
 }
 
-void Recorder::on_samples(const station::RobotState&, const station::SampleBatch& batch) {
+void Recorder::on_samples(const station::RobotState& robot, const station::SampleBatch& batch) {
   BootEntry* boot = boots_->find_recorded(batch.boot_id);
   if (boot == nullptr) {
     ++counters_.batches_malformed;
@@ -238,7 +238,7 @@ void Recorder::on_samples(const station::RobotState&, const station::SampleBatch
   const std::size_t added = boot->recording.count_new(batch);
   counters_.samples_duplicate += batch.samples.size() - added;
   if (queue_->has_room_for_samples(added)) {
-    boot->recording.append(batch, clock_.steady_us());
+    boot->recording.append(batch, robot.latest_robot_time_us, clock_.steady_us());
     queue_->count_received(added);
   } else {
     boot->recording.refuse(batch);

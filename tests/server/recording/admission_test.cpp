@@ -175,36 +175,6 @@ TEST_F(AdmissionTest, SendsTheStoreAndWhatIsDurable) {
   EXPECT_NE(again.store_id, 0u);
 }
 
-TEST_F(AdmissionTest, RefusesABootIdOfAnotherRobot) {
-  start();
-  connect(robot_);
-  TestRobot other;
-  other.id = "dory";
-  EXPECT_EQ(admit(other).refusal, rheonaut_REFUSAL_REASON_BOOT_ID_REUSED);
-  EXPECT_EQ(number("SELECT count(*) FROM robot"), 1);  // and does not enrol its bearer
-}
-
-TEST_F(AdmissionTest, RefusesABootThatLiesBeforeWhatIsStored) {
-  for (const bool restarted : {false, true}) {
-    SCOPED_TRACE(restarted);
-    std::filesystem::remove(path_);
-    TestRobot robot;
-    start();
-    connect(robot);
-    make(robot, 20);
-    flush();
-    if (restarted) {
-      kill();
-      start();
-    }
-    TestRobot earlier = robot;
-    earlier.next_seq = 19;
-    EXPECT_EQ(admit(earlier).refusal, rheonaut_REFUSAL_REASON_BOOT_ID_REUSED);
-    EXPECT_EQ(admit(robot).refusal, rheonaut_REFUSAL_REASON_NONE);
-    kill();
-  }
-}
-
 TEST_F(AdmissionTest, ANewBootIsKnownBeforeItIsStored) {
   start();
   connect(robot_);

@@ -38,7 +38,7 @@ class BootRegistryTest : public ::testing::Test {
     batch.context.period_us = 10'000;
     batch.samples.resize(samples);
     storage::BootEntry& boot = *boots_.find(boot_id);
-    boot.recording.append(batch, now_us);
+    boot.recording.append(batch, 0, now_us);
     boots_.watch(boot);
     return boot;
   }

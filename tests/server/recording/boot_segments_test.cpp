@@ -40,7 +40,7 @@ class BootSegmentsTest : public ::testing::Test {
     batch.received_at_us = static_cast<std::int64_t>(first_seq) + 1'000;
     batch.samples.resize(samples);
     for (station::Sample& sample : batch.samples) sample.position_m = position_m;
-    boot.recording.append(batch, 0);
+    boot.recording.append(batch, 0, 0);
     boots_.watch(boot);
     queue_.count_received(samples);
   }

@@ -23,7 +23,7 @@ class CommitQueueTest : public ::testing::Test {
     batch.first_robot_time_us = first_seq * 10'000;
     batch.context.period_us = 10'000;
     batch.samples.resize(samples);
-    boot.recording.append(batch, 0);
+    boot.recording.append(batch, 0, 0);
     queue_.count_received(samples);
   }
   static station::CommandRecord command(station::CommandId id, const std::string& kind) {

@@ -330,49 +330,6 @@ TEST_F(RecorderTest, CountsABatchOfABootThatIsNotRecorded) {
   EXPECT_EQ(recorder_->counters().batches_malformed, 1u);
 }
 
-TEST_F(RecorderTest, RestoresTheLatestBootAndTheLatchItWasIn) {
-  const auto restored = [this] {
-    flush();
-    kill();
-    start();
-    return restored_.robots.at(0);
-  };
-  const auto send_latch = [this](std::uint64_t seq, const char* kind, std::uint64_t id, std::uint64_t robot_time_us) {
-    station::RobotEvent event;
-    event.robot_id = robot_.id;
-    event.boot_id = robot_.boot_id;
-    event.event_seq = seq;
-    event.kind = kind;
-    event.emergency_id = id;
-    event.robot_time_us = robot_time_us;
-    recorder_->on_event(state_of(robot_, station::LinkState::connected), event);
-  };
-  start();
-  connect(robot_);
-  EXPECT_EQ(restored().boot_id, robot_.boot_id);
-  EXPECT_EQ(restored_.robots.at(0).emergency_id, 0u);
-
-  connect(robot_);
-  make(robot_, 10);
-  send_latch(0, "emergency", 0xf000000000000001, robot_.time_of(9) + 1);  // its samples have not come
-  EXPECT_EQ(restored().emergency_id, 0xf000000000000001);
-
-  connect(robot_);
-  robot_.context.emergency_id = 0xf000000000000002;  // of a stop whose event has not come
-  make(robot_, 10);
-  EXPECT_EQ(restored().emergency_id, 0xf000000000000002);
-
-  connect(robot_);
-  send_latch(1, "mode_changed", 5, robot_.time_of(30));  // says nothing of the latch
-  send_latch(2, "emergency_cleared", 0xf000000000000002, robot_.time_of(19) + 1);
-  EXPECT_EQ(restored().emergency_id, 0u);
-
-  TestRobot rebooted;
-  rebooted.boot_id = 3;  // a smaller number, and a later boot
-  connect(rebooted);
-  EXPECT_EQ(restored().boot_id, 3u);
-}
-
 TEST_F(RecorderTest, KeepsNoBookkeepingOfBootsThatAreGone) {
   start();
   connect(robot_);

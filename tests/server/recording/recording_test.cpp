@@ -117,6 +117,7 @@ station::RobotState RecordingTest::state_of(const TestRobot& robot, station::Lin
   state.firmware_version = "1.2.3";
   state.controller_checksum = 0xfedcba98;
   state.context = robot.context;
+  state.latest_robot_time_us = robot.time_of(robot.next_seq);
   return state;
 }
 
@@ -158,7 +159,8 @@ void RecordingTest::send(const TestRobot& robot, std::uint64_t first_seq, std::s
 void RecordingTest::send(const TestRobot& robot, const station::SampleBatch& batch) {
   station::SampleBatch received = batch;
   received.received_at_us = clock_.utc_us();
-  const station::RobotState state = state_of(robot, station::LinkState::connected);
+  station::RobotState state = state_of(robot, station::LinkState::connected);
+  state.latest_robot_time_us = std::max(state.latest_robot_time_us, robot.time_of(batch.next_seq()));
   recorder_->on_samples(state, received);
   runs_->on_samples(state, received);
 }

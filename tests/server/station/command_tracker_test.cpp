@@ -99,6 +99,18 @@ TEST_F(CommandTrackerTest, AnEventThatNamesACommandStandsForItsLostAnswer) {
   EXPECT_EQ(duty->record.reason, "named_by_event");
 }
 
+// SAFETY: a duty of 0 cancels the timed commands in the robot; the duty that follows it does not.
+TEST_F(CommandTrackerTest, ADutyOfZeroThatIsQueuedIsSentThoughAnotherDutyFollows) {
+  const auto first = add(set_duty(0.3F)), halt = add(set_duty(0));
+  link.can_withdraw = {first->record.id, halt->record.id};
+  const auto next = add(set_duty(0.1F));
+  tracker.supersede_queued(entry, *next);
+  EXPECT_EQ(first->record.state, station::CommandState::superseded);
+  EXPECT_EQ(halt->record.state, station::CommandState::queued);
+  tracker.supersede_queued(entry, *add(set_duty(0)));
+  EXPECT_EQ(halt->record.state, station::CommandState::superseded) << "by one that does the same";
+}
+
 TEST_F(CommandTrackerTest, AKeyThatWasUsedForAnotherCommandIsRefused) {
   station::CommandRequest request;
   request.robot_id = robot.id;

@@ -20,6 +20,16 @@ class EmergencyStopsTest : public EntryTest {
     request.key = key;
     return stops.begin(entry, request, records);
   }
+  std::shared_ptr<station::PendingCommand> add_with_key(const protocol::Command& command, const std::string& key) {
+    station::CommandRequest request;
+    request.robot_id = robot.id;
+    request.action = command;
+    request.actor = "user:anna";
+    request.key = key;
+    auto pending = make_pending(loop, clock, request, robot);
+    entry.commands.add(pending);
+    return pending;
+  }
   static protocol::CommandAck obeyed() {
     protocol::CommandAck ack = rheonaut_CommandAck_init_zero;
     ack.result = rheonaut_COMMAND_RESULT_ACCEPTED;
@@ -60,6 +70,27 @@ TEST_F(EmergencyStopsTest, OnePressThatComesTwiceIsOneStop) {
   EXPECT_THAT(link.stops, SizeIs(1));
   EXPECT_NE(begin("press-2"), first);
   EXPECT_THAT(link.stops, SizeIs(2));
+}
+
+// SAFETY: the answer of another command is none to a stop.
+TEST_F(EmergencyStopsTest, TheKeyOfACommandThatWaitsForItsAnswerStopsAllTheSame) {
+  const auto ahead = add_with_key(set_duty(0.3F), "press-1");
+  const auto stop = begin("press-1");
+  EXPECT_NE(stop, ahead);
+  EXPECT_NE(stop->record.id, ahead->record.id);
+  EXPECT_THAT(link.stops, ElementsAre(stop->record.id));
+  EXPECT_EQ(entry.commands.newest_stop(), stop) << "it is kept until the robot has obeyed";
+}
+
+TEST_F(EmergencyStopsTest, TheKeyOfAnAnsweredCommandStopsALatchedRobotAgain) {
+  const auto ended = add_with_key(set_duty(0.3F), "press-1");
+  entry.commands.take_unanswered(ended->record.id);
+  end_command(*ended, station::CommandState::verified, "", clock, recent);
+  ASSERT_NE(recent.find(ended->record.id), nullptr);
+  robot.context.emergency_id = 9;
+  const auto stop = begin("press-1");
+  EXPECT_EQ(stop->record.kind, "emergency_stop");
+  EXPECT_THAT(link.stops, ElementsAre(stop->record.id));
 }
 
 TEST_F(EmergencyStopsTest, AStopThatTheLinkThrowsAwayIsKeptAndRepeatedEachSecond) {

@@ -21,6 +21,10 @@ export const kWaits: Record<string, { what: string; todo: string }> = {
   another_experiment: { what: 'Another experiment runs on this robot.', todo: 'It begins after that.' },
   robot_not_connected: { what: 'The robot is not connected.', todo: 'Switch it on; it connects by itself.' },
   robot_not_at_rest: { what: 'The robot is not at rest.', todo: 'Set it to manual, with duty 0.' },
+  sample_period: {
+    what: "The robot's sample period is not 10 ms.",
+    todo: 'Experiments are for robots that sample each 10 ms; cancel it.',
+  },
   emergency: { what: 'The robot is in emergency.', todo: 'Look at the robot, then clear the latch.' },
   reserved: { what: 'The robot is reserved for somebody else.', todo: 'It begins when that slot is over.' },
   reserved_soon: {
