@@ -152,8 +152,12 @@ InitialMotion motion_with_lag(const Stacked& all, const Eigen::ColPivHouseholder
 // What a flexible model has bent itself to, (1) no longer shows; but its first samples then fit worse than the rest.
 void add_rough_beginning(const Recording& recording, const Fit& fit, std::vector<std::string>& warnings) {
   const auto& residual = recording.position_m.empty() ? fit.velocity_residual_m_s : fit.position_residual_m;
-  std::vector<double> size(residual.size());
-  std::ranges::transform(residual, size.begin(), [](double r) { return std::abs(r); });
+  std::vector<double> size, end_s;  // of what was measured
+  for (std::size_t k = 0; k < residual.size(); ++k) {
+    if (!recording.is_missed.empty() && recording.is_missed[k]) continue;
+    size.push_back(std::abs(residual[k]));
+    end_s.push_back(recording.dt_s * static_cast<double>(k + 1));
+  }
   const double in_a_second = std::min(1 / recording.dt_s, static_cast<double>(size.size()) / 4);
   for (const std::ptrdiff_t first : {kFewest, static_cast<std::ptrdiff_t>(in_a_second)}) {
     if (first < kFewest || 2 * first > std::ssize(size)) continue;
@@ -161,7 +165,7 @@ void add_rough_beginning(const Recording& recording, const Fit& fit, std::vector
     if (!(ratio > kRoughBeginning) || !std::isfinite(ratio)) continue;
     std::ostringstream text;
     text.precision(2);
-    text << "the first " << recording.dt_s * static_cast<double>(first) << " s fit " << ratio
+    text << "the first " << end_s[static_cast<std::size_t>(first - 1)] << " s fit " << ratio
          << " times worse than the rest: the run seems to begin in motion, or shows fast terms that the model lacks; "
             "begin the record at rest";
     warnings.push_back(text.str());

@@ -1,15 +1,21 @@
 // Eigen's solver, stopped by the limit and by numbers that are not finite.
 #include "control/search/descent.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <unsupported/Eigen/NonLinearOptimization>
 #include <utility>
+#include <vector>
 
 namespace control {
 namespace {
 
 using Eigen::Index;
+
+constexpr std::ptrdiff_t kIdleIterations = 10;
+constexpr double kIdleGain = 2e-3;       // a step of one sigma changes the cost by 1, in these units
+constexpr double kAgreementGain = 0.04;  // a fifth of a sigma
 
 // What the solver calls; negative: it stops.
 struct Functor {
@@ -37,12 +43,23 @@ struct Functor {
   Index values() const { return squares.values; }
 };
 
+// What lies at a bound is infinitely far away in coordinates without bounds, and is approached for ever.
+bool is_idle(const std::vector<double>& costs, Index values) {
+  if (std::ssize(costs) <= kIdleIterations) return false;
+  const double now = costs.back(), before = costs[costs.size() - 1 - kIdleIterations];
+  return (before - now) * static_cast<double>(values) < kIdleGain * now;
+}
+
 bool is_at(const KnownMinimum& known, const Eigen::VectorXd& x, double cost) {
   return std::abs(cost - known.cost) <= KnownMinimum::kAgreement * known.cost &&
          (x - known.x).cwiseAbs().maxCoeff() <= KnownMinimum::kNear;
 }
 
 }  // namespace
+
+bool costs_agree(double cost, double best, double values) {
+  return cost <= best * (1 + std::max(KnownMinimum::kAgreement, kAgreementGain / values));
+}
 
 Descended descend(const SquaresToMinimise& squares, Eigen::VectorXd x, int iteration_limit, Progress progress,
                   SearchLimit& limit, const KnownMinimum* known) {
@@ -62,6 +79,7 @@ Descended descend(const SquaresToMinimise& squares, Eigen::VectorXd x, int itera
     return found;
   }
   found.has_begun = true;
+  std::vector<double> costs;
   for (int i = 0; status == Status::NotStarted || status == Status::Running; ++i) {
     if (i >= iteration_limit) {
       found.end = SearchEnd::iteration_limit;
@@ -72,6 +90,8 @@ Descended descend(const SquaresToMinimise& squares, Eigen::VectorXd x, int itera
     found.iterations = ++progress.iteration;
     progress.sse = squares.sse(solver.fvec);
     limit.report(progress);
+    costs.push_back(solver.fvec.squaredNorm());
+    if (is_idle(costs, squares.values)) break;
     if (limit.is_reached() || (known != nullptr && is_at(*known, x, solver.fvec.squaredNorm()))) break;
   }
   if (functor.is_not_finite) found.end = SearchEnd::not_finite;

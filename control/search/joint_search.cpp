@@ -259,8 +259,8 @@ void JointSearch::run_starts(Structure structure, JointResult& result) {
     if (limit_.end()) break;
   }
   result.starts = static_cast<int>(costs.size());
-  result.starts_that_agree = static_cast<int>(std::ranges::count_if(
-      costs, [&](double found) { return found <= best * (1 + KnownMinimum::kAgreement) + rounding; }));
+  result.starts_that_agree = static_cast<int>(
+      std::ranges::count_if(costs, [&](double found) { return costs_agree(found - rounding, best, values); }));
 }
 
 void JointSearch::refine_weights(Structure structure, JointResult& result) {

@@ -309,7 +309,7 @@ SearchResult OutputErrorSearch::run(Structure structure, int parts) {
 void OutputErrorSearch::run_starts(Structure structure, SearchResult& result) {
   std::vector<double> costs;
   const int starts = 1 + options_.further_starts;
-  const double rounding = kRoundingShare * kRoundingShare * static_cast<double>(rows_);
+  const double values = static_cast<double>(rows_), rounding = kRoundingShare * kRoundingShare * values;
   double best = std::numeric_limits<double>::infinity();
   std::optional<KnownMinimum> minimum;
   for (int index = 0; index < starts; ++index) {
@@ -334,9 +334,8 @@ void OutputErrorSearch::run_starts(Structure structure, SearchResult& result) {
     if (limit_.end()) break;
   }
   result.starts = static_cast<int>(costs.size());
-  result.starts_that_agree = static_cast<int>(std::count_if(costs.begin(), costs.end(), [&](double found) {
-    return found <= best * (1 + KnownMinimum::kAgreement) + rounding;
-  }));
+  result.starts_that_agree = static_cast<int>(
+      std::ranges::count_if(costs, [&](double found) { return costs_agree(found - rounding, best, values); }));
 }
 
 void OutputErrorSearch::refine_channel_weights(Structure structure, SearchResult& result) {

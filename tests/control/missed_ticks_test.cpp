@@ -162,6 +162,16 @@ TEST(MissedTicks, PercentAndWhitenessAreThoseOfTheTicksThatWereMade) {
   EXPECT_NEAR(fit.residual_sd, residual.norm() / std::sqrt(static_cast<double>(ticks.size())), 1e-9);
 }
 
+// The first 0.6 s are rough, and most of the first 0.2 s was not measured, which fits neither well nor badly.
+TEST(MissedTicks, ARoughBeginningIsThatOfTheMeasuredValues) {
+  std::vector<std::size_t> ticks{0};
+  for (std::size_t k = 21; k < 2001; ++k) ticks.push_back(k);
+  Recording whole = position_run(kFluid, held(prbs_duty(0.6, 0.2, 20, kDtS), ticks), 1e-4, 6);
+  for (std::size_t k = 0; k < 60; ++k) whole.position_m[k] += k % 2 == 0 ? 5e-4 : -5e-4;
+  EXPECT_THAT(identify(sampled_at(whole, ticks), one_start()).warnings,
+              testing::Contains(HasSubstr("times worse than the rest")));
+}
+
 TEST(MissedTicks, OfAnAccelerometerToo) {
   const auto ticks = most_ticks(1501, 0.01, 6);
   Recording whole{kDtS, held(prbs_duty(0.6, 0.2, 15, kDtS), ticks), {}, {}};
