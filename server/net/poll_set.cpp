@@ -189,14 +189,14 @@ void PollSet::Socket::end_wait(error_code error) {
 }
 
 void PollSet::Socket::on_ready(std::uint32_t events) {
-  constexpr std::uint32_t kEnd = EPOLLERR | EPOLLHUP;
+  constexpr std::uint32_t kEnd = EPOLLERR | EPOLLHUP | EPOLLRDHUP;
   if ((events & (EPOLLOUT | kEnd)) != 0) end_wait({});
   if (reader_ && (events & (EPOLLIN | kEnd)) != 0) reader_();
 }
 
-// An awaited or quiet socket stays in the epoll of all, with an empty mask: ready in both it would wake the loop twice,
-// and to fill a mask cannot fail, so what is no longer awaited, or for want of memory never was, is read with the
-// others. By the empty mask that epoll still reports at once that the connection was reset.
+// An awaited socket stays in the epoll of all, with an empty mask: ready in both it would wake the loop twice, and to
+// fill a mask cannot fail, so what is no longer awaited, or for want of memory never was, is read with the
+// others. Of a quiet one that epoll still reports at once that the connection has ended.
 // Where nobody reads or waits to write it is in none: an epoll reports the end of a connection whatever the mask,
 // again and again.
 bool PollSet::Socket::update() {
@@ -206,8 +206,9 @@ bool PollSet::Socket::update() {
   const bool is_set = set_events(set_->awaited_, in_awaited_, at_once != 0, at_once);
   const bool is_quiet = reader_ && pace_ == ReadPace::quiet;
   set_quiet(is_quiet);
-  const bool is_read_elsewhere = is_quiet || (pace_ == ReadPace::awaited && is_set);
-  return set_events(set_->all_, in_all_, reading != 0, is_read_elsewhere ? 0 : reading) && is_set;
+  const bool is_read_there = pace_ == ReadPace::awaited && is_set;
+  const std::uint32_t among_all = is_quiet ? EPOLLRDHUP : is_read_there ? 0 : reading;
+  return set_events(set_->all_, in_all_, reading != 0, among_all) && is_set;
 }
 
 bool PollSet::Socket::set_events(const Group& group, std::optional<std::uint32_t>& present, bool is_wanted,

@@ -34,6 +34,7 @@ class Line {
   Line& operator=(const Line&) = delete;
 
   void say(char byte) const { ASSERT_EQ(::send(ends_.far, &byte, 1, MSG_NOSIGNAL), 1); }
+  void end_sending() const { ::shutdown(ends_.far, SHUT_WR); }
   void hang_up() {
     if (ends_.far >= 0) ::close(ends_.far);
     ends_.far = -1;

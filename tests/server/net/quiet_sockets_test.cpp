@@ -85,14 +85,19 @@ TEST_F(QuietSocketsTest, AQuietOneIsCalledAlsoWithoutBytes) {
 }
 
 TEST_F(QuietSocketsTest, TheEndOfAQuietConnectionIsReportedAtOnce) {
-  add_quiet_lines(1);
-  bool has_ended = false;
-  lines[0]->socket().watch([&] {
-    if (!lines[0]->take()) has_ended = true;
-  });
-  lines[0]->hang_up();
-  clock.settle();
-  EXPECT_TRUE(has_ended);
+  for (const bool is_half_open : {false, true}) {
+    add_quiet_lines(1);
+    Line& line = *lines.back();
+    bool has_ended = false;
+    line.socket().watch([&] {
+      if (!line.take()) has_ended = true;
+    });
+    is_half_open ? line.end_sending() : line.hang_up();
+    clock.settle();
+    EXPECT_TRUE(has_ended) << is_half_open;
+    line.leave();
+    clock.run_for(1s);
+  }
 }
 
 TEST_F(QuietSocketsTest, EverybodyElseHasATurnAfterAFewOfTheQuiet) {
