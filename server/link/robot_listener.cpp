@@ -25,6 +25,7 @@ RobotListener::RobotListener(asio::io_context& loop, runtime::Clock& clock, runt
 asio::awaitable<void> RobotListener::run() {
   tasks_.spawn("robots' sockets", sockets_.run());
   tasks_.spawn("awaited robots' sockets", sockets_.run_awaited());
+  tasks_.spawn("quiet robots' sockets", sockets_.run_quiet());
   auto on_connection = [this](asio::ip::tcp::socket socket) { accept(tls::StreamSocket{std::move(socket)}); };
   const runtime::Counted listening{access_.listening};
   co_await listener_.run(on_connection);

@@ -20,6 +20,10 @@ constexpr auto kClosedByRobot = "the robot closed the connection";
 constexpr auto kUndecodedHello = "a hello that does not decode";
 constexpr auto kFault = "a fault of the station; its log says which";
 constexpr std::int64_t kGridUs = 4'000;  // at whose multiples sessions wake, many at once
+// How long a robot is read promptly after a command to it, and after more than this came at once: it sends again what
+// it could not send before, and its memory for what we have not acknowledged may be small.
+constexpr std::int64_t kCommandedUs = 5'000'000, kMuchUs = 1'000'000;
+constexpr std::size_t kMuchBytes = 2048;
 
 }  // namespace
 
@@ -91,9 +95,13 @@ void RobotSession::read() {
   try {
     if (!close_reason_.empty()) return reading_paused_.notify();
     const net::ByteStream::Read got = stream_->read_now(asio::buffer(buffers_.input));
-    if (got.size > 0) last_received_us_ = clock_.steady_us();
-    on_bytes({buffers_.input.data(), got.size});
+    if (got.size > 0) {
+      last_received_us_ = clock_.steady_us();
+      if (got.size > kMuchBytes) stay_prompt(kMuchUs);
+      on_bytes({buffers_.input.data(), got.size});
+    }
     if (got.has_ended && close_reason_.empty()) close_reason_ = kClosedByRobot;
+    if (!robot_id_.empty()) update_read_pace();
     if (!close_reason_.empty()) reading_paused_.notify();
   } catch (...) {
     failure_ = std::current_exception();
@@ -186,7 +194,7 @@ asio::awaitable<RobotSession::EndReason> RobotSession::read_frames() {
   const std::vector<std::uint8_t> first = std::move(after_hello_);
   on_bytes({first.data(), first.size()});
   stream_->on_readable([this] { read(); });
-  update_read_priority();
+  update_read_pace();
   co_await reading_paused_.wait();
   co_return failure_ ? kFault : close_reason_;
 }
@@ -217,7 +225,7 @@ void RobotSession::on_frame(protocol::RobotFrame& frame) {
     case rheonaut_RobotFrame_command_ack_tag:
       outbox_.on_ack(frame.body.command_ack);
       station_.on_command_ack(*this, frame.body.command_ack);
-      update_read_priority();
+      update_read_pace();
       break;
     case rheonaut_RobotFrame_stop_probe_answer_tag: on_stop_probe_answer(frame.body.stop_probe_answer); break;
     case rheonaut_RobotFrame_heartbeat_tag: on_heartbeat(frame); break;
@@ -234,7 +242,7 @@ void RobotSession::report_unusable(const protocol::RobotFrame& frame) {
 void RobotSession::on_heartbeat(const protocol::RobotFrame& frame) {
   const protocol::Heartbeat& answer = frame.body.heartbeat;
   if (!outbox_.on_probe_answer(answer.echo_station_time_us)) return;
-  update_read_priority();
+  update_read_pace();
   station::ClockExchange exchange;
   exchange.sent_at_us = static_cast<std::int64_t>(answer.echo_station_time_us);
   exchange.received_at_robot_us = static_cast<std::int64_t>(answer.echo_received_at_robot_us);
@@ -245,7 +253,7 @@ void RobotSession::on_heartbeat(const protocol::RobotFrame& frame) {
 
 void RobotSession::on_stop_probe_answer(const protocol::StopProbeAnswer& answer) {
   if (!outbox_.stop_probes().on_answer(answer.echo_station_time_us, last_received_us_, clock_.utc_us())) return;
-  update_read_priority();
+  update_read_pace();
   report_stop_path();
 }
 
@@ -281,15 +289,24 @@ void RobotSession::flush() {
   while (const auto written = outbox_.write_next(clock_.steady_us(), write)) {
     // SAFETY: the frame first, what the station says of it afterwards.
     if (written->command_id) station_.on_command_sent(*this, *written->command_id);
-    update_read_priority();
+    update_read_pace();
   }
   if (outbox_.unsent().empty()) return;
   writing_since_us_ = clock_.steady_us();
   wake_writer_.notify();
 }
 
-// SAFETY: the answer to an emergency stop waits behind no other robot. Nor does that to a probe, which measures time.
-void RobotSession::update_read_priority() { stream_->set_awaited(outbox_.awaits_answer()); }
+// SAFETY: the answer to an emergency stop waits behind no other robot and in no pause. Nor does that to a probe, which
+// measures time. A robot that somebody watches or commands is read promptly, the others every 30 ms.
+void RobotSession::update_read_pace() {
+  const bool is_prompt = clock_.steady_us() < prompt_until_us_ || station_.is_attended(*this);
+  const net::ReadPace unasked = is_prompt ? net::ReadPace::prompt : net::ReadPace::quiet;
+  stream_->set_pace(outbox_.awaits_answer() ? net::ReadPace::awaited : unasked);
+}
+
+void RobotSession::stay_prompt(std::int64_t duration_us) {
+  prompt_until_us_ = std::max(prompt_until_us_, clock_.steady_us() + duration_us);
+}
 
 // A robot that is silent, or that does not take what we write, is lost: TCP alone would notice much later.
 // Heartbeats leave from here.
@@ -314,6 +331,7 @@ asio::awaitable<RobotSession::EndReason> RobotSession::watch_link() {
 
 bool RobotSession::send(const protocol::Command& command, std::int64_t deadline_us) {
   if (!outbox_.enqueue(command, deadline_us)) return false;
+  stay_prompt(kCommandedUs);
   wake_writer_.notify();
   return true;
 }
@@ -322,6 +340,7 @@ bool RobotSession::withdraw(station::CommandId id) { return outbox_.withdraw(id)
 
 void RobotSession::send_emergency_stop(const protocol::Command& command) {
   outbox_.enqueue_stop(command);
+  stay_prompt(kCommandedUs);
   flush();  // SAFETY: it leaves now, not when the writer resumes
 }
 

@@ -73,7 +73,8 @@ class RobotSession final : public station::RobotLink {
   void on_stop_probe_answer(const protocol::StopProbeAnswer& answer);
   void report_stop_path();
   void flush();
-  void update_read_priority();
+  void update_read_pace();
+  void stay_prompt(std::int64_t duration_us);
 
   runtime::Clock& clock_;
   std::unique_ptr<net::ByteStream> stream_;
@@ -97,6 +98,7 @@ class RobotSession final : public station::RobotLink {
   station::StopPath stop_path_;  // as the station was told
 
   std::int64_t last_received_us_ = 0;
+  std::int64_t prompt_until_us_ = 0;              // what comes is read promptly, even if nobody waits for it
   std::optional<std::int64_t> writing_since_us_;  // while there is something unsent
   std::string close_reason_;
 };

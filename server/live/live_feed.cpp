@@ -298,6 +298,11 @@ void LiveFeed::on_command(const station::CommandRecord& record) {
   if (commands_.size() == kMaxLog) publish_log();
 }
 
+bool LiveFeed::watches(const station::RobotId& id) const {
+  const auto robot = robots_.find(id);
+  return !watch_all_.empty() || (robot != robots_.end() && !robot->second.watchers.empty());
+}
+
 void LiveFeed::publish_log() {
   if (events_.empty() && commands_.empty()) return;
   Message log{[&] { return dump({{"type", "log"}, {"events", list(events_)}, {"commands", list(commands_)}}); }};

@@ -47,6 +47,7 @@ class LiveFeed final : public station::StationSink {
   void on_samples(const station::RobotState& robot, const station::SampleBatch& batch) override;
   void on_event(const station::RobotState& robot, const station::RobotEvent& event) override;
   void on_command(const station::CommandRecord& record) override;
+  bool watches(const station::RobotId& robot) const override;
 
  private:
   using Subscribers = std::vector<Subscriber*>;

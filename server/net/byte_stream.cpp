@@ -68,7 +68,7 @@ class SocketStream final : public ByteStream {
     co_return true;
   }
 
-  void set_awaited(bool awaited) override { socket_.set_awaited(awaited); }
+  void set_pace(ReadPace pace) override { socket_.set_pace(pace); }
 
   void close() override { ::shutdown(descriptor_.get(), SHUT_RDWR); }
 

@@ -11,6 +11,8 @@
 #include <memory>
 #include <string>
 
+#include "server/net/read_pace.hpp"
+
 namespace server::tls {
 class StreamSocket;
 }  // namespace server::tls
@@ -31,8 +33,9 @@ class ByteStream {
   };
   virtual Read read_now(boost::asio::mutable_buffer into) = 0;
 
-  // Called from the loop, again and again, while there is something to read or the stream has ended, until it is set
-  // to another function or to none. It does not throw, nor destroy the stream.
+  // Called from the loop, again and again, while there is something to read or the stream has ended, and now and then
+  // without anything to read, until it is set to another function or to none. It does not throw, nor destroy the
+  // stream.
   virtual void on_readable(std::function<void()> call) = 0;
 
   // How many of the bytes the stream took without waiting: 0 also when it has ended. What it did not take must be what
@@ -42,8 +45,8 @@ class ByteStream {
   // All bytes; false when the stream ended before.
   virtual boost::asio::awaitable<bool> write(boost::asio::const_buffer bytes) = 0;
 
-  // From now on, or no longer, what comes is read before what comes on other streams: an answer is expected.
-  virtual void set_awaited(bool awaited) = 0;
+  // How soon what comes from now on, and what is unread, is read; prompt until it is set.
+  virtual void set_pace(ReadPace pace) = 0;
 
   // Ends both directions; a pending write returns.
   virtual void close() = 0;
@@ -67,9 +70,9 @@ class MemoryLink {
   std::unique_ptr<ByteStream> take_first();
   std::unique_ptr<ByteStream> take_second();
 
-  void cut();                      // both ends see the end of the stream
-  bool second_is_awaited() const;  // as its owner said last
-  void stall(bool stalled);        // half-open: bytes are accepted and not delivered until the stall ends
+  void cut();                    // both ends see the end of the stream
+  ReadPace second_pace() const;  // as its owner said last; here everything is read at once
+  void stall(bool stalled);      // half-open: bytes are accepted and not delivered until the stall ends
 
  private:
   struct Pipe;

@@ -52,7 +52,7 @@ struct MemoryLink::Pipe : std::enable_shared_from_this<MemoryLink::Pipe> {
   runtime::Signal writable;
   bool closed = false;
   bool stalled = false;
-  bool awaited = false;
+  ReadPace pace = ReadPace::prompt;
 };
 
 class MemoryLink::End final : public ByteStream {
@@ -91,7 +91,7 @@ class MemoryLink::End final : public ByteStream {
     co_return true;
   }
 
-  void set_awaited(bool awaited) override { in_->awaited = awaited; }
+  void set_pace(ReadPace pace) override { in_->pace = pace; }
 
   void close() override {
     in_->close();
@@ -118,7 +118,7 @@ void MemoryLink::cut() {
   back_->close();
 }
 
-bool MemoryLink::second_is_awaited() const { return there_->awaited; }
+ReadPace MemoryLink::second_pace() const { return there_->pace; }
 
 void MemoryLink::stall(bool stalled) {
   for (Pipe* pipe : {there_.get(), back_.get()}) {

@@ -23,7 +23,7 @@ PollSet::Group::Group() : epoll{::epoll_create1(EPOLL_CLOEXEC)} {
 
 PollSet::Group::~Group() { ::close(epoll); }
 
-PollSet::PollSet(asio::io_context& loop, runtime::Clock& clock) : loop_{loop}, clock_{clock} {}
+PollSet::PollSet(asio::io_context& loop, runtime::Clock& clock) : loop_{loop}, clock_{clock}, has_quiet_{loop} {}
 
 PollSet::~PollSet() {
   for (Socket* socket : std::exchange(sockets_, {})) {
@@ -88,6 +88,28 @@ asio::awaitable<void> PollSet::run_awaited() {
   }
 }
 
+// In rounds that are a pause apart, so that many wake the loop once.
+asio::awaitable<void> PollSet::run_quiet() {
+  for (std::int64_t round_us = clock_.steady_us();;) {
+    while (quiet_.empty()) co_await has_quiet_.wait();
+    co_await clock_.sleep_until(std::max(quiet_.front()->due_us_, round_us + kPause.count()));
+    round_us = clock_.steady_us();
+    while (read_due(round_us) == kQuietAtOnce) co_await asio::post(loop_, asio::use_awaitable);
+  }
+}
+
+// Some of the quiet; returns how many. The code that is called may destroy any socket.
+std::size_t PollSet::read_due(std::int64_t now_us) {
+  std::size_t count = 0;
+  for (; count < kQuietAtOnce && !quiet_.empty() && quiet_.front()->due_us_ <= now_us; ++count) {
+    Socket& socket = *quiet_.front();
+    socket.due_us_ = now_us + kQuietPause.count();
+    quiet_.splice(quiet_.end(), quiet_, quiet_.begin());
+    socket.on_ready(EPOLLIN);
+  }
+  return count;
+}
+
 // Returns how many there were.
 asio::awaitable<std::size_t> PollSet::poll_until_empty(Group& group) {
   for (std::size_t total = 0;;) {
@@ -144,10 +166,19 @@ asio::awaitable<void> PollSet::Socket::writable() {
   return asio::async_initiate<const asio::use_awaitable_t<>, void(error_code)>(std::move(begin), asio::use_awaitable);
 }
 
-void PollSet::Socket::set_awaited(bool awaited) {
-  if (awaited == is_awaited_) return;
-  is_awaited_ = awaited;
+void PollSet::Socket::set_pace(ReadPace pace) {
+  if (pace == pace_) return;
+  pace_ = pace;
   update();
+}
+
+void PollSet::Socket::set_quiet(bool quiet) {
+  if (quiet == own_node_.empty()) return;
+  if (!quiet) return own_node_.splice(own_node_.begin(), set_->quiet_, quiet_at_);
+  due_us_ = set_->clock_.steady_us() + kQuietPause.count();
+  quiet_at_ = own_node_.begin();
+  if (set_->quiet_.empty()) set_->has_quiet_.notify();
+  set_->quiet_.splice(set_->quiet_.end(), own_node_);
 }
 
 void PollSet::Socket::end_wait(error_code error) {
@@ -158,22 +189,26 @@ void PollSet::Socket::end_wait(error_code error) {
 }
 
 void PollSet::Socket::on_ready(std::uint32_t events) {
-  constexpr std::uint32_t kEnd = EPOLLERR | EPOLLHUP;
+  constexpr std::uint32_t kEnd = EPOLLERR | EPOLLHUP | EPOLLRDHUP;
   if ((events & (EPOLLOUT | kEnd)) != 0) end_wait({});
   if (reader_ && (events & (EPOLLIN | kEnd)) != 0) reader_();
 }
 
 // An awaited socket stays in the epoll of all, with an empty mask: ready in both it would wake the loop twice, and to
-// fill a mask cannot fail, so what is no longer awaited, or for want of memory never was, is read with the others.
+// fill a mask cannot fail, so what is no longer awaited, or for want of memory never was, is read with the
+// others. Of a quiet one that epoll still reports at once that the connection has ended.
 // Where nobody reads or waits to write it is in none: an epoll reports the end of a connection whatever the mask,
 // again and again.
 bool PollSet::Socket::update() {
   if (set_ == nullptr) return !reader_ && !writer_;
   const std::uint32_t reading = reader_ ? EPOLLIN : 0, writing = writer_ ? EPOLLOUT : 0;
-  const std::uint32_t at_once = (is_awaited_ ? reading : 0) | writing;
+  const std::uint32_t at_once = (pace_ == ReadPace::awaited ? reading : 0) | writing;
   const bool is_set = set_events(set_->awaited_, in_awaited_, at_once != 0, at_once);
-  const bool is_read_there = is_awaited_ && is_set;
-  return set_events(set_->all_, in_all_, reading != 0, is_read_there ? 0 : reading) && is_set;
+  const bool is_quiet = reader_ && pace_ == ReadPace::quiet;
+  set_quiet(is_quiet);
+  const bool is_read_there = pace_ == ReadPace::awaited && is_set;
+  const std::uint32_t among_all = is_quiet ? EPOLLRDHUP : is_read_there ? 0 : reading;
+  return set_events(set_->all_, in_all_, reading != 0, among_all) && is_set;
 }
 
 bool PollSet::Socket::set_events(const Group& group, std::optional<std::uint32_t>& present, bool is_wanted,

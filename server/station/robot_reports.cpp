@@ -208,6 +208,14 @@ void Station::on_stop_path(RobotLink& link, const StopPath& path) {
   if (has_changed) parts_->notifier.publish(robot);
 }
 
+bool Station::is_attended(const RobotLink& link) const {
+  const RobotEntry* entry = RobotTable::of(link);
+  if (entry == nullptr) return false;
+  const RobotState& robot = entry->robot;
+  const bool is_commanded = robot.pending_stop || !robot.control.holder.empty() || !entry->timed.by.empty();
+  return is_commanded || !entry->commands.is_empty() || parts_->notifier.is_watched(robot.id);
+}
+
 void Station::on_parameters(RobotLink& link, const protocol::ParameterPage& page) {
   RobotEntry* entry = RobotTable::of(link);
   if (entry == nullptr) return;

@@ -1,5 +1,6 @@
 #include "server/station/sink_notifier.hpp"
 
+#include <algorithm>
 #include <utility>
 
 #include "server/station/state/unknown_values.hpp"
@@ -44,6 +45,10 @@ void SinkNotifier::publish_unusable_samples(const RobotState& robot, std::uint64
 
 void SinkNotifier::publish_unusable_event(const RobotState& robot, std::uint64_t event_seq) {
   for (StationSink* sink : sinks_) sink->on_unusable_event(robot, event_seq);
+}
+
+bool SinkNotifier::is_watched(const RobotId& id) const {
+  return std::ranges::any_of(sinks_, [&id](const StationSink* sink) { return sink->watches(id); });
 }
 
 void SinkNotifier::note(const RobotState& robot, std::string kind, std::string detail, std::string cause) {

@@ -29,6 +29,8 @@ class SinkNotifier {
   void publish_unusable_samples(const RobotState& robot, std::uint64_t first_seq, std::uint64_t next_seq);
   void publish_unusable_event(const RobotState& robot, std::uint64_t event_seq);
 
+  bool is_watched(const RobotId& id) const;  // by one of them
+
   // An event of the station itself about a robot. Its kind has a row in docs/database.md: tests/check_docs.py compares
   // the table with the literals of the calls.
   void note(const RobotState& robot, std::string kind, std::string detail, std::string cause = "none");

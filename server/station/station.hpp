@@ -132,6 +132,8 @@ class Station {
   void on_command_sent(RobotLink& link, CommandId id);
   void on_clock(RobotLink& link, const ClockExchange& exchange);
   void on_stop_path(RobotLink& link, const StopPath& path);
+  // Somebody watches, controls or commands the robot, or its stop is pending: what it sends is to be seen promptly.
+  bool is_attended(const RobotLink& link) const;
   void on_parameters(RobotLink& link, const protocol::ParameterPage& page);
   void on_controller(RobotLink& link, const protocol::Controller& controller);
 

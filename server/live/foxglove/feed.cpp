@@ -1,6 +1,7 @@
 // Nothing is written for nobody.
 #include "server/live/foxglove/feed.hpp"
 
+#include <algorithm>
 #include <ranges>
 
 #include "server/station/state/telemetry_message.hpp"
@@ -68,6 +69,10 @@ void Feed::on_command(const station::CommandRecord& record) {
   for (const Reader& reader : readers) {
     reader.session->queue().push_data(reader.subscription, nanoseconds(record.submitted_at_us), body);
   }
+}
+
+bool Feed::watches(const station::RobotId& robot) const {
+  return std::ranges::any_of(sessions_, [&robot](const Session* session) { return session->is_subscribed(robot); });
 }
 
 }  // namespace server::live::foxglove

@@ -23,6 +23,7 @@ class Feed final : public station::StationSink {
   void on_samples(const station::RobotState& robot, const station::SampleBatch& batch) override;
   void on_event(const station::RobotState& robot, const station::RobotEvent& event) override;
   void on_command(const station::CommandRecord& record) override;
+  bool watches(const station::RobotId& robot) const override;
 
   std::size_t sessions() const { return sessions_.size(); }
 

@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <ranges>
 
 namespace server::live::foxglove {
@@ -111,6 +112,12 @@ std::optional<SubscriptionId> Session::subscription(const station::RobotId& robo
   const auto channels = robots_.find(robot);
   if (channels == robots_.end()) return std::nullopt;
   return channels->second[static_cast<std::size_t>(topic)].by;
+}
+
+bool Session::is_subscribed(const station::RobotId& robot) const {
+  const auto channels = robots_.find(robot);
+  if (channels == robots_.end()) return false;
+  return std::ranges::any_of(channels->second, [](const Subscribed& one) { return one.by.has_value(); });
 }
 
 }  // namespace server::live::foxglove

@@ -33,6 +33,7 @@ class Session {
 
   // None: it has not subscribed.
   std::optional<SubscriptionId> subscription(const station::RobotId& robot, Topic topic) const;
+  bool is_subscribed(const station::RobotId& robot) const;  // to one of its topics
 
   OutgoingQueue& queue() { return queue_; }
 

@@ -26,6 +26,9 @@ class StationSink {
   virtual void on_audit(const AuditNote&) {}
   virtual void on_clock(const RobotState&, const ClockRecord&) {}
   virtual void on_in_force(const RobotState&, const InForceRecord&) {}
+
+  // Whether somebody waits for what the robot sends; if nobody does, it may be read some 30 ms later.
+  virtual bool watches(const RobotId&) const { return false; }
 };
 
 }  // namespace server::station

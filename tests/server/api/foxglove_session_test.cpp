@@ -196,6 +196,18 @@ TEST_F(FoxgloveSessionTest, AWrongSubscriptionIsAnsweredWithAStatus) {
   feed.remove(session);
 }
 
+TEST_F(FoxgloveSessionTest, TheFeedWatchesTheRobotsOfWhichATopicIsSubscribed) {
+  Session session{loop, clock, std::nullopt};
+  feed.add(session, {{"sim-1", robot("sim-1")}, {"sim-2", robot("sim-2")}});
+  EXPECT_FALSE(feed.watches("sim-2"));
+  subscribe(session, 5, 0);
+  EXPECT_TRUE(feed.watches("sim-2")) << "of its events only";
+  EXPECT_FALSE(feed.watches("sim-1"));
+  session.on_text(R"({"op":"unsubscribe","subscriptionIds":[0]})");
+  EXPECT_FALSE(feed.watches("sim-2"));
+  feed.remove(session);
+}
+
 TEST_F(FoxgloveSessionTest, ASlowClientLosesTheOldestSamplesAndLearnsHowMany) {
   Session session{loop, clock, "sim-1"};
   feed.add(session, {{"sim-1", robot("sim-1")}});

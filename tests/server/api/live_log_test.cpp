@@ -1,4 +1,4 @@
-// Which changes of commands pages receive.
+// Which changes of commands pages receive, and whose samples.
 #include <gtest/gtest.h>
 
 #include "server/live/live_feed.hpp"
@@ -61,6 +61,24 @@ TEST(LiveLog, OfRenewalsOfLeasesOnlyARefusedOneIsSent) {
   EXPECT_EQ(logged[0]["commands"].size(), 4U);
   tasks.stop();
   clock.settle();
+}
+
+TEST(LiveLog, RobotsWhoseSamplesSomebodyGetsAreWatched) {
+  boost::asio::io_context loop;
+  VirtualClock clock{loop};
+  live::LiveFeed live{clock};
+  live::Subscriber subscriber{loop};
+  EXPECT_FALSE(live.watches("r1"));
+  live.add(subscriber);
+  EXPECT_TRUE(live.watches("r1")) << "who has named none gets those of all";
+  live.watch(subscriber, {"r2", "r3"});
+  EXPECT_FALSE(live.watches("r1"));
+  EXPECT_TRUE(live.watches("r2"));
+  live.watch(subscriber, {"r1"});
+  EXPECT_TRUE(live.watches("r1"));
+  EXPECT_FALSE(live.watches("r2"));
+  live.remove(subscriber);
+  EXPECT_FALSE(live.watches("r1"));
 }
 
 }  // namespace

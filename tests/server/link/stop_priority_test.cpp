@@ -22,25 +22,25 @@ TEST_F(LinkTest, AnEmergencyStopGoesAheadOfWhatWaitsAndReplacesIt) {
 TEST_F(LinkTest, WhatARobotSendsIsAwaitedUntilItHasAnsweredAStop) {
   auto* robot = connect();
   ASSERT_EQ(robot->heartbeats().size(), 1U);
-  EXPECT_TRUE(robot->link.second_is_awaited()) << "a probe of its clock, too";
+  EXPECT_EQ(robot->link.second_pace(), net::ReadPace::awaited) << "a probe of its clock, too";
   protocol::RobotFrame answer = rheonaut_RobotFrame_init_zero;
   answer.which_body = rheonaut_RobotFrame_heartbeat_tag;
   answer.body.heartbeat.echo_station_time_us = robot->heartbeats()[0].station_time_us;
   answer.body.heartbeat.echo_received_at_robot_us = robot->robot_now_us();
   robot->send(answer);
   clock.settle();
-  EXPECT_FALSE(robot->link.second_is_awaited());
+  EXPECT_NE(robot->link.second_pace(), net::ReadPace::awaited);
   stop_robot();
   clock.settle();
-  EXPECT_TRUE(robot->link.second_is_awaited());
+  EXPECT_EQ(robot->link.second_pace(), net::ReadPace::awaited);
   protocol::Command other = robot->commands().at(0);
   other.command_id += 1;
   robot->acknowledge(other, rheonaut_COMMAND_RESULT_ACCEPTED, 0);
   clock.settle();
-  EXPECT_TRUE(robot->link.second_is_awaited()) << "of another command";
+  EXPECT_EQ(robot->link.second_pace(), net::ReadPace::awaited) << "of another command";
   robot->acknowledge(robot->commands().at(0), rheonaut_COMMAND_RESULT_ACCEPTED, 9);
   clock.settle();
-  EXPECT_FALSE(robot->link.second_is_awaited());
+  EXPECT_NE(robot->link.second_pace(), net::ReadPace::awaited);
 }
 
 TEST_F(LinkTest, AStopLatchesTheStationUntilItIsCleared) {
