@@ -16,7 +16,7 @@ namespace {
 
 constexpr int kRssiDbm = -50;
 constexpr double kMostDriftPpm = 100'000;
-constexpr std::uint64_t kTicksToMotorOff = 5;
+constexpr std::uint64_t kPeriodsToMotorOff = 5;  // robot_fw::kMotorOffS, counted from the last tick
 const std::string kFirmware = std::string{"sim-"} + base::version();
 
 robot_fw::RobotConfig core_config(const SimulatedRobotConfig& config) {
@@ -117,7 +117,7 @@ void SimulatedRobot::idle_to(std::uint64_t now_us) {
 
 void SimulatedRobot::skip(std::uint64_t ticks) {
   for (std::uint64_t i = 0; i < ticks; ++i) {
-    if (skipped_++ >= kTicksToMotorOff) motor_duty_ = 0;
+    if (++skipped_ >= kPeriodsToMotorOff) motor_duty_ = 0;  // the last tick's own period was the first
     world_.step(motor_duty_);
   }
   robot_time_us_ += ticks * kPeriodUs;

@@ -154,7 +154,7 @@ std::vector<Case> cases() {
        [](Trial& trial) { trial.station.disconnect(); }},
       {"2.2", "a held duty: who holds it renews its lease no more", 510, false, false, [](Trial&) {},
        [](Trial& trial) { trial.renews = false; }},
-      {"2.8", "the robot's program hangs", 60, false, false, [](Trial&) {}, [](Trial& trial) { trial.hangs = true; }},
+      {"2.8", "the robot's program hangs", 50, false, false, [](Trial&) {}, [](Trial& trial) { trial.hangs = true; }},
       {"4.1", "the robot is beyond a position limit", 10, false, false,
        [](Trial& trial) { trial.order(set_parameter("position_limit_max_m", trial.limit_m)); }, [](Trial&) {},
        [](const Trial& trial) {

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "chip.hpp"
+#include "robot_fw/core/motion_sense.hpp"
 
 namespace robot_fw::esp8266 {
 namespace {
@@ -102,6 +103,10 @@ TEST_F(MotorOnChip, InterruptTurnsItOffFiftyMillisecondsAfterTheLastTick) {
   EXPECT_EQ(high_us(200'000'000), 0U) << "also when the cycle counter has come round";
   EXPECT_TRUE(motor.is_off());
   EXPECT_EQ(motor.dead_man_trips(), 1U);
+}
+
+TEST_F(MotorOnChip, TheCoreKnowsWhenTheInterruptTurnsItOff) {
+  EXPECT_FLOAT_EQ(static_cast<float>(kDeadManUs) * 1e-6F, kMotorOffS);
 }
 
 TEST_F(MotorOnChip, StaysOffUntilATickCompletes) {

@@ -17,6 +17,7 @@ namespace {
 
 using cli::ToolAnswer;
 using ::testing::AllOf;
+using ::testing::ContainsRegex;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
@@ -34,6 +35,17 @@ class RunTools : public RecordingTest {
       plant_.step(duty);
     }
     if (lacks_a_velocity_) batch.samples.front().velocity_m_s = std::nanf("");
+    send(robot_, batch);
+    robot_.next_seq += count;
+  }
+
+  // The propeller turns, the robot does not move, and the sensor trembles.
+  void tremble(std::size_t count) {
+    station::SampleBatch batch = robot_.batch(robot_.next_seq, count);
+    for (std::size_t k = 0; k < count; ++k) {
+      batch.samples[k].position_m = 1e-3F * static_cast<float>(static_cast<int>(k * 7919 % 101) - 50);
+      batch.samples[k].duty = 0.3F;
+    }
     send(robot_, batch);
     robot_.next_seq += count;
   }
@@ -294,6 +306,27 @@ TEST_F(RunTools, IdentifyWarnsOfAnEstimatedRunThatBeginsInMotion) {
   const auto [of_run, of_csv] = from_run_and_csv(run);
   EXPECT_THAT(of_run["warnings"].back().get<std::string>(), HasSubstr("begins in motion, at about 0.0"));
   EXPECT_EQ(of_run["warnings"], of_csv["warnings"]);
+}
+
+TEST_F(RunTools, IdentifyOfSeveralRunsEndsWithStatus4IfItExplainsNoneOfThem) {
+  const storage::RunId first = begin();
+  tremble(400);
+  flush();
+  ASSERT_TRUE(wait(runs_->end(first, "")));
+  const storage::RunId second = wait(runs_->create(robot_.id, named("again"))).value().id;
+  tremble(400);
+  flush();
+  ASSERT_TRUE(wait(runs_->end(second, "")));
+  ASSERT_TRUE(wait(runs_->create(robot_.id, named("moves"))));
+  swim(200, 0.3);
+  swim(200, -0.3);
+  flush();
+  const ToolAnswer none = ask("identify --run 1 --run 2 --structure first_order");
+  EXPECT_EQ(none.exit_code, 4);
+  EXPECT_THAT(none.error, ContainsRegex("explains .* % of run 1 and .* % of run 2, so its parameters say nothing"));
+  const ToolAnswer one = ask("identify --run 1 --run 3 --structure first_order");
+  EXPECT_EQ(one.exit_code, 0) << one.error;
+  EXPECT_THAT(one.error, ContainsRegex("explains .* % of run 1 only; its parameters come from the other runs"));
 }
 
 TEST_F(RunTools, ReadingADatabaseAtRestLeavesNothingBeside) {
