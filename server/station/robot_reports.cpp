@@ -177,6 +177,8 @@ void Station::on_command_ack(RobotLink& link, const protocol::CommandAck& ack) {
     EmergencyStops::show_pending(*entry);
   } else {
     parts_->tracker.on_answer(*entry, *pending, ack);
+    const bool is_renewal = pending->wire.which_action == rheonaut_Command_renew_lease_tag;
+    if (is_renewal && was_accepted(pending->record.state)) entry->robot.lease_renewed_at_us = parts_->clock.utc_us();
   }
   parts_->notifier.publish(entry->robot);
 }
