@@ -144,6 +144,7 @@ json to_json(const station::RobotState& robot) {
   out["model"] = to_json(robot.model);
   out["lease_renewed_at_us"] = time_or_null(robot.lease_renewed_at_us);
   out["invalid_values"] = robot.invalid_values;
+  out["events_left_out"] = robot.events_left_out;
   out["unknown_values"] =
       object_or_null(station::UnknownValues{}.add("reset_cause", robot.reset_cause).add_fields_of(context).text());
   out["control"] = robot.control.holder.empty() ? json(nullptr) : to_json(robot.control);

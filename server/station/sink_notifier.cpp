@@ -46,6 +46,10 @@ void SinkNotifier::publish_unusable_event(const RobotState& robot, std::uint64_t
   for (StationSink* sink : sinks_) sink->on_unusable_event(robot, event_seq);
 }
 
+void SinkNotifier::publish_event_left_out(const RobotState& robot, std::uint64_t event_seq) {
+  for (StationSink* sink : sinks_) sink->on_event_left_out(robot, event_seq);
+}
+
 void SinkNotifier::note(const RobotState& robot, std::string kind, std::string detail, std::string cause) {
   RobotEvent event;
   event.robot_id = robot.id;

@@ -28,6 +28,7 @@ class SinkNotifier {
   void publish_fluid(const RobotState& robot);
   void publish_unusable_samples(const RobotState& robot, std::uint64_t first_seq, std::uint64_t next_seq);
   void publish_unusable_event(const RobotState& robot, std::uint64_t event_seq);
+  void publish_event_left_out(const RobotState& robot, std::uint64_t event_seq);
 
   // An event of the station itself about a robot. Its kind has a row in docs/database.md: tests/check_docs.py compares
   // the table with the literals of the calls.

@@ -67,6 +67,7 @@ const robot = (robot_id: string, seq: number): RobotState => ({
   changed_limits: [],
   lease_renewed_at_us: null,
   invalid_values: 0,
+  events_left_out: 0,
   unknown_values: null,
 });
 

@@ -186,6 +186,7 @@ struct RobotState {
 
   std::vector<ChangedLimit> changed_limits;  // as the robot said last
   std::uint64_t invalid_values = 0;      // that its frames had since the station started: not finite, beyond all range
+  std::uint64_t events_left_out = 0;     // that it sent since then and nobody recorded: too many in a short time
   std::int64_t lease_renewed_at_us = 0;  // UTC when it last accepted a renewal of a lease; 0: not since then
   ControlState control;
   std::optional<Reservation> reservation;  // that runs now

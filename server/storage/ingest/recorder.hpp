@@ -139,6 +139,7 @@ class Recorder final : public station::StationSink, public station::RobotArchive
   void on_samples(const station::RobotState& robot, const station::SampleBatch& batch) override;
   void on_unusable_samples(const station::RobotState& robot, std::uint64_t first_seq, std::uint64_t next_seq) override;
   void on_unusable_event(const station::RobotState& robot, std::uint64_t event_seq) override;
+  void on_event_left_out(const station::RobotState& robot, std::uint64_t event_seq) override;
   void on_event(const station::RobotState& robot, const station::RobotEvent& event) override;
   // Renewals of a lease in a row become one record: Renewals.
   void on_command(const station::CommandRecord& command) override;

@@ -75,6 +75,13 @@ void Recorder::on_unusable_event(const station::RobotState& robot, std::uint64_t
   watch(*boot);
 }
 
+void Recorder::on_event_left_out(const station::RobotState& robot, std::uint64_t event_seq) {
+  BootEntry* boot = boots_->find_recorded(robot.boot_id);
+  if (boot == nullptr) return;
+  boot->recording.set_event_lost(event_seq, "too_many", robot.last_received_at_us);
+  watch(*boot);
+}
+
 // SAFETY: whatever waits, since its limits must hold after a restart. One entry for each robot at most.
 void Recorder::on_fluid(const station::RobotState& robot) {
   queue_->set_fluid(robot.id, robot.fluid);

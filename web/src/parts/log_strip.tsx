@@ -66,7 +66,7 @@ export function describe({ event, command, note, position_sd_m }: LogLine): [ton
     const spread = position_sd_m === null ? unknown : ` ${plus_minus(position_sd_m)} mm`;
     const at = position && ` · controller at ${position}${spread}`;
     const way_out = kWaysOut[event.kind] ? ` · ${kWaysOut[event.kind]}` : '';
-    const caution = /lost|fault|limit|lapsed|uncertain|mismatch$/.test(event.kind);
+    const caution = /lost|left_out|fault|limit|lapsed|uncertain|mismatch$/.test(event.kind);
     return [
       alarm ? 'alarm' : caution ? 'caution' : '',
       'event',
