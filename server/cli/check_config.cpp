@@ -16,8 +16,9 @@ std::string or_none(std::uint32_t value, const char* unit, const char* none) {
 }
 
 void print_recording(const config::RecordingConfig& recording, std::ostream& out) {
-  fmt::print(out, "keep     {}, database {}, warning below {} MB free, nothing new below {} MB\n",
+  fmt::print(out, "keep     {}, events {}, database {}, warning below {} MB free, nothing new below {} MB\n",
              or_none(recording.retention_days, "days", "for ever"),
+             or_none(recording.event_retention_days, "days", "for ever"),
              or_none(recording.max_database_mb, "MB", "without limit"), recording.low_space_mb,
              recording.critical_space_mb);
 }
@@ -54,6 +55,7 @@ nlohmann::ordered_json json_of(const config::Config& config) {
           {"limits_where_fluid_unknown", limits_json(config.envelope.strictest())},
           {"recording",
            {{"retention_days", recording.retention_days},
+            {"event_retention_days", recording.event_retention_days},
             {"max_database_mb", recording.max_database_mb},
             {"low_space_mb", recording.low_space_mb},
             {"critical_space_mb", recording.critical_space_mb}}},

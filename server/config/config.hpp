@@ -15,14 +15,15 @@
 
 namespace server::config {
 
-// Section [recording]: how long samples that no run holds are kept, and how much room there must be. 1 MB is 10^6
-// bytes.
+// Section [recording]: how long samples and events that no run holds are kept, and how much room there must be. 1 MB is
+// 10^6 bytes.
 struct RecordingConfig {
-  std::uint32_t retention_days = 0;       // recording.retention_days; 0: for ever
-  std::uint32_t max_database_mb = 0;      // recording.max_database_mb; 0: no limit
-  std::uint32_t low_space_mb = 2048;      // recording.low_space_mb: with less free space people are warned
-  std::uint32_t critical_space_mb = 512;  // recording.critical_space_mb: ... nothing new is begun
-  std::filesystem::path backup_dir;       // recording.backup_dir; empty: "backups" in the data folder
+  std::uint32_t retention_days = 0;        // recording.retention_days; 0: for ever
+  std::uint32_t event_retention_days = 0;  // recording.event_retention_days: the same of events; 0: for ever
+  std::uint32_t max_database_mb = 0;       // recording.max_database_mb; 0: no limit
+  std::uint32_t low_space_mb = 2048;       // recording.low_space_mb: with less free space people are warned
+  std::uint32_t critical_space_mb = 512;   // recording.critical_space_mb: ... nothing new is begun
+  std::filesystem::path backup_dir;        // recording.backup_dir; empty: "backups" in the data folder
 };
 
 // Section [tls]. Beyond this machine's loopback, bytes travel in TLS or, where somebody said so, in plain sight.

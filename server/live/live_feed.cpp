@@ -40,7 +40,8 @@ bool is_progress(const station::RobotState& before, const station::RobotState& n
          before.fluid == now.fluid && before.model == now.model && before.status == now.status &&
          before.parameters_checksum == now.parameters_checksum && before.changed_limits == now.changed_limits &&
          before.controller_checksum == now.controller_checksum && before.invalid_values == now.invalid_values &&
-         before.peer == now.peer && before.retired_at_us == now.retired_at_us;
+         before.events_left_out == now.events_left_out && before.peer == now.peer &&
+         before.retired_at_us == now.retired_at_us;
 }
 
 // A message to some: its text is written for the first subscriber, and once for all.

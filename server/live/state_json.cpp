@@ -142,7 +142,9 @@ json to_json(const station::RobotState& robot) {
   out["changed_limits"] = json::array();
   for (const station::ChangedLimit& limit : robot.changed_limits) out["changed_limits"].push_back(to_json(limit));
   out["model"] = to_json(robot.model);
+  out["lease_renewed_at_us"] = time_or_null(robot.lease_renewed_at_us);
   out["invalid_values"] = robot.invalid_values;
+  out["events_left_out"] = robot.events_left_out;
   out["unknown_values"] =
       object_or_null(station::UnknownValues{}.add("reset_cause", robot.reset_cause).add_fields_of(context).text());
   out["control"] = robot.control.holder.empty() ? json(nullptr) : to_json(robot.control);
@@ -171,6 +173,10 @@ json to_json(const station::CommandRecord& record) {
   out["acknowledged_after_us"] = stage(record.acknowledged_after_us);
   out["verified_after_us"] = stage(record.verified_after_us);
   out["life_from"] = record.life_from.empty() ? json(nullptr) : json(record.life_from);
+  if (record.kind == "renew_lease") {
+    out["further_renewals"] = record.further_renewals ? json(*record.further_renewals) : json(nullptr);
+    out["last_renewed_at_us"] = time_or_null(record.last_renewed_at_us);
+  }
   return out;
 }
 

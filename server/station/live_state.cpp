@@ -16,6 +16,7 @@ void begin_boot(RobotEntry& entry) {
   entry.robot.clock = ClockEstimate{};
   entry.reported.begin_boot();
   entry.orders.clear();
+  entry.next_event_seq = 0;
   entry.commands.unknown.clear();  // what the boot before knew of them is gone
   entry.timed.by.clear();
   entry.timed.until_robot_us = entry.timed.drop_id = 0;
@@ -67,6 +68,7 @@ void begin_connection(RobotEntry& entry, const AdmissionRequest& hello, const pr
   robot.latest_robot_time_us = hello.robot_time_us;
   robot.stop_path = {.is_measured = details.answers_stop_probes};
   if (is_other_boot) begin_boot(entry);
+  entry.next_event_seq = std::max(entry.next_event_seq, admission.durable_next_event_seq);
   show_hello(robot, hello, details, admission, is_other_boot);
 }
 

@@ -11,6 +11,7 @@
 #include "server/station/commands/robot_commands.hpp"
 #include "server/station/event_limit.hpp"
 #include "server/station/reported_configuration.hpp"
+#include "server/station/state/event_allowance.hpp"
 #include "server/station/state/robot_link.hpp"
 
 namespace server::station {
@@ -44,6 +45,8 @@ struct RobotEntry {
   std::uint64_t latch_known_at_robot_us = 0;  // older telemetry says nothing about the latch
   EventLimit refusals{kEventPeriodUs};
   EventLimit invalid_values{kEventPeriodUs};
+  EventAllowance events;
+  std::uint64_t next_event_seq = 0;  // of this boot: those from here on have not come before
 };
 
 }  // namespace server::station

@@ -24,6 +24,18 @@ std::vector<const protocol::Command*> commands_of(const std::vector<std::shared_
   return commands;
 }
 
+// One that came before is on disk, or counted, or will be asked for again.
+void record(StationParts& parts, RobotEntry& entry, Checked<protocol::Event> checked) {
+  const protocol::Event& event = *checked;
+  const bool is_new = event.event_seq >= entry.next_event_seq;
+  entry.next_event_seq = std::max(entry.next_event_seq, event.event_seq + 1);
+  if (entry.events.take(event.kind, parts.clock.steady_us())) {
+    parts.notifier.publish(entry.robot, event_of(entry.robot, checked));
+  } else if (is_new) {
+    parts.leave_out(entry, event.event_seq);
+  }
+}
+
 ReportMoment moment_of(const RobotEntry& entry, const runtime::Clock& clock) {
   return moment_of_report(entry.robot, entry.orders.next_sample_at_robot_us(), clock.utc_us());
 }
@@ -60,6 +72,7 @@ void Station::on_disconnected(RobotLink& link, const std::string& reason) {
   RobotEntry* entry = RobotTable::of(link);
   if (entry == nullptr) return;  // another connection has taken its place
   RobotTable::disconnect(*entry);
+  parts_->report_left_out(*entry, true);
   RobotState& robot = entry->robot;
   robot.link = LinkState::disconnected;
   robot.stop_path = {.is_measured = robot.stop_path.is_measured};
@@ -97,6 +110,7 @@ void Station::on_frame(RobotLink& link, std::uint64_t robot_time_us) {
   robot.last_received_at_us = parts_->clock.utc_us();
   robot.last_received_steady_us = parts_->clock.steady_us();
   robot.latest_robot_time_us = std::max(robot.latest_robot_time_us, robot_time_us);
+  parts_->report_left_out(*entry, false);
   parts_->tracker.expire(*entry);
   if (!robot.pending_stop) return;
   parts_->publish_stops_of([&](std::vector<CommandRecord>& made) { parts_->stops.repeat(*entry, made); });
@@ -125,7 +139,7 @@ void Station::on_samples(RobotLink& link, Checked<protocol::Telemetry> telemetry
 void Station::on_event(RobotLink& link, Checked<protocol::Event> event) {
   RobotEntry* entry = RobotTable::of(link);
   if (entry == nullptr) return;
-  parts_->notifier.publish(entry->robot, event_of(entry->robot, event));
+  record(*parts_, *entry, event);
   entry->orders.note_event(*event);
   parts_->tracker.on_event(*entry, *event);
 }
@@ -177,6 +191,8 @@ void Station::on_command_ack(RobotLink& link, const protocol::CommandAck& ack) {
     EmergencyStops::show_pending(*entry);
   } else {
     parts_->tracker.on_answer(*entry, *pending, ack);
+    const bool is_renewal = pending->wire.which_action == rheonaut_Command_renew_lease_tag;
+    if (is_renewal && was_accepted(pending->record.state)) entry->robot.lease_renewed_at_us = parts_->clock.utc_us();
   }
   parts_->notifier.publish(entry->robot);
 }

@@ -51,6 +51,10 @@ bool SinkNotifier::is_watched(const RobotId& id) const {
   return std::ranges::any_of(sinks_, [&id](const StationSink* sink) { return sink->watches(id); });
 }
 
+void SinkNotifier::publish_event_left_out(const RobotState& robot, std::uint64_t event_seq) {
+  for (StationSink* sink : sinks_) sink->on_event_left_out(robot, event_seq);
+}
+
 void SinkNotifier::note(const RobotState& robot, std::string kind, std::string detail, std::string cause) {
   RobotEvent event;
   event.robot_id = robot.id;

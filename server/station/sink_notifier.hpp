@@ -28,6 +28,7 @@ class SinkNotifier {
   void publish_fluid(const RobotState& robot);
   void publish_unusable_samples(const RobotState& robot, std::uint64_t first_seq, std::uint64_t next_seq);
   void publish_unusable_event(const RobotState& robot, std::uint64_t event_seq);
+  void publish_event_left_out(const RobotState& robot, std::uint64_t event_seq);
 
   bool is_watched(const RobotId& id) const;  // by one of them
 

@@ -69,6 +69,7 @@ const StopTimes& Station::stop_times() const { return parts_->tracker.stop_times
 
 const runtime::TimeHistogram& Station::round_trips() const { return parts_->round_trips; }
 std::uint64_t Station::invalid_values() const { return parts_->invalid_values; }
+std::uint64_t Station::events_left_out() const { return parts_->events_left_out; }
 config::LinkTimes Station::link_times() const { return parts_->times; }
 const config::Envelope& Station::envelope() const { return parts_->envelope; }
 

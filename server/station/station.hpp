@@ -102,7 +102,8 @@ class Station {
   const StopTimes& stop_times() const;
   // Of heartbeats of all robots: there and back, without the time that the robot took to answer.
   const runtime::TimeHistogram& round_trips() const;
-  std::uint64_t invalid_values() const;  // of all robots, since the station started
+  std::uint64_t invalid_values() const;   // of all robots, since the station started
+  std::uint64_t events_left_out() const;  // likewise
 
   // --- called by robot sessions (link/) ---
 
@@ -121,6 +122,7 @@ class Station {
   void on_enrolment_refused(const RobotId& id, const std::string& peer, const std::string& detail);
   void on_frame(RobotLink& link, std::uint64_t robot_time_us);  // any frame: a sign of life
   void on_samples(RobotLink& link, Checked<protocol::Telemetry> telemetry);
+  // Acts on it, and has it recorded, unless the robot has sent too many (EventAllowance): those are counted.
   void on_event(RobotLink& link, Checked<protocol::Event> event);
   // Values of a frame that cannot be: counted, and an event of the first of them, at most one each 10 s.
   void on_invalid_values(RobotLink& link, std::uint64_t count, const char* cause, const std::string& first);

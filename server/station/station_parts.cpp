@@ -77,6 +77,25 @@ void StationParts::publish_refusal(Author by, const RobotId& robot_id, const cha
   notifier.publish(note);
 }
 
+void StationParts::leave_out(RobotEntry& entry, std::uint64_t event_seq) {
+  ++events_left_out;
+  ++entry.robot.events_left_out;
+  entry.events.count_left_out(clock.steady_us());
+  notifier.publish_event_left_out(entry.robot, event_seq);
+}
+
+void StationParts::report_left_out(RobotEntry& entry, bool at_once) {
+  const auto left_out = entry.events.report(clock.steady_us(), at_once);
+  if (!left_out) return;
+  const std::int64_t utc_minus_steady_us = clock.utc_us() - clock.steady_us();
+  std::string detail =
+      fmt::format("{} from {} to {}: more than {} at once and {} a second are counted and not recorded",
+                  left_out->count, utc_text(left_out->first_us + utc_minus_steady_us),
+                  utc_text(left_out->last_us + utc_minus_steady_us), EventAllowance::kBurst, EventAllowance::kASecond);
+  spdlog::warn("robot '{}' sends too many events: {}", entry.robot.id, detail);
+  notifier.note(entry.robot, "events_left_out", std::move(detail), "too_many");
+}
+
 // Nothing is sent, and the audit gets an entry.
 std::unexpected<Error> StationParts::refuse(const CommandRequest& request, Error error) {
   const char* kind = protocol::kind(request.action);

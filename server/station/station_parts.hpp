@@ -43,6 +43,10 @@ struct StationParts {
   // What was refused, for the audit; `detail` as a JSON object.
   void publish_refusal(Author by, const RobotId& robot_id, const char* what, const std::string& detail,
                        const Error& error);
+  // Counts an event that is not recorded, and reports it to the sinks.
+  void leave_out(RobotEntry& entry, std::uint64_t event_seq);
+  // An event says how many the robot's events were that were not recorded, at most once in 10 s or at once.
+  void report_left_out(RobotEntry& entry, bool at_once);
   std::unexpected<Error> refuse(const CommandRequest& request, Error error);
 
   boost::asio::io_context& loop;
@@ -57,6 +61,7 @@ struct StationParts {
   TimedCommands timed{loop, clock, notifier, tracker};
   EventLimit enrolment_refusals{kEventPeriodUs};  // of robots that are not known, whatever their names are
   std::uint64_t invalid_values = 0;               // of all robots, since the station started
+  std::uint64_t events_left_out = 0;              // likewise
   runtime::TimeHistogram round_trips;             // likewise
   SampleBatch batch;                              // of the frame that is being received; kept for its memory
   std::function<void(const RobotState&, const Author&)> on_fluid_named = [](const RobotState&, const Author&) {};

@@ -15,7 +15,7 @@ std::filesystem::path backup_folder(const std::filesystem::path& database, const
 }
 
 RetentionPolicy retention_policy(const config::RecordingConfig& config) {
-  return {config.retention_days, config.max_database_mb * std::uint64_t{1'000'000}};
+  return {config.retention_days, config.event_retention_days, config.max_database_mb * std::uint64_t{1'000'000}};
 }
 
 }  // namespace

@@ -65,7 +65,9 @@ const robot = (robot_id: string, seq: number): RobotState => ({
   model: { state: 'assumed', fluid: null, reason: '', fit_error: null, set_at_us: null },
   retired: false,
   changed_limits: [],
+  lease_renewed_at_us: null,
   invalid_values: 0,
+  events_left_out: 0,
   unknown_values: null,
 });
 

@@ -148,9 +148,9 @@ export class Api {
     this.ask<Overview>('GET', past(robot_id, 'overview', { from_us, to_us, points, channels: kOverviewChannels }));
   robot_events = async (robot_id: string) =>
     (await this.ask<{ events: EventRecord[] }>('GET', past(robot_id, 'events', { limit: 1000 }))).events;
-  // The newest 1000, but for renewals of leases: there are ten a second while a motor runs.
+  // The newest 1000. Of renewals of leases those that stand for many, no single ones: an older station kept ten a second.
   robot_commands = async (robot_id: string, within: Record<string, number> = {}) => {
-    const path = past(robot_id, 'commands', { ...within, limit: 1000, renewals: 'false' });
+    const path = past(robot_id, 'commands', { ...within, limit: 1000, renewals: 'counted' });
     return (await this.ask<{ commands: CommandRecord[] }>('GET', path)).commands;
   };
   // A page; `after` null: the first.

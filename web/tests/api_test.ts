@@ -25,10 +25,10 @@ test('a command is a POST of JSON with SI units', async () => {
   expect(JSON.parse(String(asked[0]?.options.body))).toEqual({ kind: 'set_mode', mode: 'auto', setpoint_m: 0.1 });
 });
 
-test('the commands of a robot are asked for without renewals, which would fill the list', async () => {
+test('the commands of a robot are asked for without single renewals, which would fill the list', async () => {
   const { api, asked } = api_that_answers(200, { commands: [] });
   await api.robot_commands('rheo-1');
-  expect(asked[0]?.path).toBe('/api/v1/robots/rheo-1/commands?limit=1000&renewals=false');
+  expect(asked[0]?.path).toBe('/api/v1/robots/rheo-1/commands?limit=1000&renewals=counted');
 });
 
 test('a known refusal is said in the words of the operator', async () => {

@@ -4,6 +4,7 @@ import { h, render } from 'preact';
 import { afterEach, beforeEach, expect, test, vi } from 'vitest';
 import type { CommandRecord, ControllerInForce, LiveMessage, ParametersInForce, RobotState } from '../src/api';
 import { controller_text, known_text } from '../src/parts/in_force';
+import { renewals_text } from '../src/parts/log_strip';
 import { LogPanel } from '../src/parts/log_panel';
 import { NewestCommands } from '../src/parts/newest_commands';
 import type { Session } from '../src/session';
@@ -52,6 +53,18 @@ test('an answer replaces what it is newer than, and nothing that was said since 
   expect(known.list.value).toBeNull();
   known.take_answer([command('2'), command('1', { state: 'verified' })]);
   expect(states_of(known)).toEqual(['2 verified', '1 verified']);
+});
+
+test('renewals in a row say how many they were, or that nobody knows', () => {
+  const renewal = (more: Partial<CommandRecord>) => renewals_text(command('1', { kind: 'renew_lease', ...more }));
+  expect(renewals_text(command('1'))).toBe('');
+  expect(renewal({ further_renewals: 0, last_renewed_at_us: null })).toBe('');
+  const last_renewed_at_us = new Date(2026, 10, 27, 12, 3, 4).getTime() * 1000;
+  expect(renewal({ further_renewals: 1412, last_renewed_at_us })).toMatch(/^ and 1.412 more until 12:03:04/);
+  expect(renewal({ further_renewals: null, last_renewed_at_us: null })).toBe(' and more, not counted yet');
+  expect(renewal({ further_renewals: null, last_renewed_at_us: null, reason: 'station_restarted' })).toBe(
+    ' and an unknown number more',
+  );
 });
 
 test('renewals of a lease and commands of other robots are left out', () => {

@@ -48,6 +48,17 @@ std::optional<storage::MarkerCursor> parse_marker_cursor(const std::string& text
                                static_cast<std::int64_t>((*numbers)[2])};
 }
 
+Result<storage::RenewalRows> query_renewals(const http::Request& request) {
+  const auto given = request.query.find("renewals");
+  if (given == request.query.end() || given->second == "true") return storage::RenewalRows::all;
+  if (given->second == "false") return storage::RenewalRows::none;
+  if (given->second == "counted") return storage::RenewalRows::counted;
+  return fail(
+      ErrorCode::bad_request,
+      fmt::format("renewals = '{}' is not true, false or counted", given->second.substr(0, kMaxQuotedParameter)),
+      "out_of_range");
+}
+
 // None when the parameter is not given.
 template <class Cursor, class Parse>
 Result<std::optional<Cursor>> cursor_in(const http::Request& request, const char* name, Parse parse) {
@@ -156,13 +167,13 @@ Result<storage::RecordFilter> query_record_filter(const http::Request& request) 
   if (!window) return std::unexpected{window.error()};
   const auto before = cursor_in<storage::RecordCursor>(request, "before", parse_record_cursor);
   if (!before) return std::unexpected{before.error()};
-  const auto renewals = query_flag(request, "renewals");
+  const auto renewals = query_renewals(request);
   if (!renewals) return std::unexpected{renewals.error()};
   storage::RecordFilter filter;
   filter.limit = *limit;
   if (*window) filter.window = **window;
   filter.before = *before;
-  filter.has_renewals = renewals->value_or(true);
+  filter.renewals = *renewals;
   return filter;
 }
 

@@ -140,8 +140,11 @@ std::string metrics_text(const RecordingRoutes& parts) {
   metrics.counter("samples_refused_total", counters.samples_refused, "Samples that the full queue did not take.");
   metrics.counter("samples_lost_total", counters.samples_lost, "Samples in gaps that were noted.");
   metrics.counter("samples_purged_total", retention.samples_purged, "Samples that retention removed.");
+  metrics.counter("events_purged_total", retention.events_purged, "Events that retention removed.");
   metrics.counter("records_refused_total", counters.records_refused, "Events and commands not recorded.");
   metrics.counter("batches_malformed_total", counters.batches_malformed, "Frames of samples that cannot be.");
+  metrics.counter("events_left_out_total", station.events_left_out(),
+                  "Events that were not recorded, since a robot sent too many.");
   metrics.counter("invalid_values_total", station.invalid_values(), "Values of robots' frames that cannot be.");
   metrics.counter("commits_total", counters.commits, "Commits.");
   metrics.counter("commits_failed_total", counters.commits_failed, "Commits that failed and were tried again.");

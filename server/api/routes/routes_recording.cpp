@@ -28,8 +28,10 @@ json to_json(const storage::RecorderCounters& counters) {
 
 json to_json(const storage::Retention& retention) {
   return {{"retention_days", retention.policy().retention_days},
+          {"event_retention_days", retention.policy().event_retention_days},
           {"max_database_bytes", retention.policy().max_database_bytes},
           {"samples_purged", retention.counters().samples_purged},
+          {"events_purged", retention.counters().events_purged},
           {"bytes_returned", retention.counters().pages_returned * 4096},
           {"longest_step_ms", static_cast<double>(retention.counters().longest_step_us) / 1000},
           {"all_held", retention.counters().all_held}};

@@ -21,6 +21,10 @@ std::optional<std::int64_t> unless_negative(std::int64_t time_us) {
   return time_us < 0 ? std::nullopt : std::optional{time_us};
 }
 
+std::optional<std::int64_t> unless_zero(std::int64_t time_us) {
+  return time_us == 0 ? std::nullopt : std::optional{time_us};
+}
+
 template <class Visit>
 void visit_members(const station::RobotEvent& event, Visit visit) {
   visit("robot_id", event.robot_id);
@@ -62,6 +66,8 @@ void visit_members(const station::CommandRecord& command, Visit visit) {
   visit("acknowledged_after_us", unless_negative(command.acknowledged_after_us));
   visit("verified_after_us", unless_negative(command.verified_after_us));
   visit("life_from", command.life_from);
+  visit("further_renewals", command.further_renewals);
+  visit("last_renewed_at_us", unless_zero(command.last_renewed_at_us));
 }
 
 const char* json_type_of(const std::string&) { return "string"; }

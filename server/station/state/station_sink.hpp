@@ -21,6 +21,8 @@ class StationSink {
     static_cast<void>(first_seq), static_cast<void>(next_seq);
   }
   virtual void on_unusable_event(const RobotState&, std::uint64_t event_seq) { static_cast<void>(event_seq); }
+  // An event that came and is not recorded, since the robot has sent too many.
+  virtual void on_event_left_out(const RobotState&, std::uint64_t event_seq) { static_cast<void>(event_seq); }
   virtual void on_event(const RobotState&, const RobotEvent&) {}
   virtual void on_command(const CommandRecord&) {}
   virtual void on_audit(const AuditNote&) {}

@@ -185,7 +185,9 @@ struct RobotState {
   StopPath stop_path;
 
   std::vector<ChangedLimit> changed_limits;  // as the robot said last
-  std::uint64_t invalid_values = 0;  // that its frames had since the station started: not finite, beyond all range
+  std::uint64_t invalid_values = 0;      // that its frames had since the station started: not finite, beyond all range
+  std::uint64_t events_left_out = 0;     // that it sent since then and nobody recorded: too many in a short time
+  std::int64_t lease_renewed_at_us = 0;  // UTC when it last accepted a renewal of a lease; 0: not since then
   ControlState control;
   std::optional<Reservation> reservation;  // that runs now
   std::optional<CommandId> pending_stop;   // an emergency stop that no robot has acknowledged yet
@@ -236,6 +238,11 @@ struct CommandRecord {
   std::int64_t verified_after_us = -1;
   std::string life_from;  // its time to live counts from: "arrival", "stamp" (of /live), "issued_at"; empty for a stop
   std::string peer;       // the address that it came from; empty: from the station itself
+
+  // Of a renewal of a lease that is stored: the renewals that the robot accepted right after it, and that have no
+  // record of their own. None: not known, since they go on, or the station ended before they did (`reason`).
+  std::optional<std::uint64_t> further_renewals = 0;
+  std::int64_t last_renewed_at_us = 0;  // UTC when the last of them was submitted; 0: there is none, or it is not known
 };
 
 }  // namespace server::station

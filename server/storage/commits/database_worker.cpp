@@ -22,7 +22,7 @@ OpenedDatabase DatabaseWorker::open_now(std::int64_t utc_us) {
   database_ = std::make_unique<Database>(path_);
   store_ = std::make_unique<SampleStore>(*database_);
   try {
-    fail_unfinished_commands(*database_, utc_us);
+    end_unfinished_commands(*database_, utc_us);
   } catch (const SQLite::Exception& error) {  // SAFETY: with a full disk, too, robots come in and can be stopped
     spdlog::warn("commands of an earlier start stay unfinished in the record: {}", error.what());
   }

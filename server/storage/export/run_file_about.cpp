@@ -150,6 +150,11 @@ constexpr Meaning kMeanings[] = {
     {"", "acknowledged_after_us", "time from the request to the robot's answer; NULL: no answer"},
     {"", "verified_after_us", "time from the request to telemetry that shows the effect; NULL: not seen"},
     {"", "life_from", "from which time its validity counted: arrival, stamp or issued_at; empty: it does not expire"},
+    {"", "further_renewals",
+     "of a renewal of a lease: those that the robot accepted right after it and that have no row; NULL: unknown, or "
+     "they"
+     " went on"},
+    {"", "last_renewed_at_us", "when the last of them was requested; NULL: there is none, or it is unknown"},
 
     // Audit (docs/database.md).
     {"", "entry", "number of the entry on its station, without holes"},

@@ -48,6 +48,7 @@ struct Copy {
 };
 constexpr std::int64_t kAuditSince = 5;
 constexpr std::int64_t kReferenceSince = 7;
+constexpr std::int64_t kRenewalsSince = 10;
 
 constexpr Copy kCopies[] = {
     {"CREATE TABLE run AS SELECT * FROM store.run WHERE run_id = {0}"},
@@ -79,6 +80,13 @@ constexpr Copy kCopies[] = {
      "SELECT max(event_row) FROM (SELECT event_row FROM store.event WHERE robot_id = (SELECT robot_id FROM run)"
      " AND event_row > {1} ORDER BY event_row LIMIT 1000)"},
     {"CREATE TABLE command AS SELECT * FROM store.robot_command LIMIT 0"},
+    // Renewals of a lease that began before the run and went on in it: few commands come between, refused renewals.
+    {"INSERT INTO command SELECT robot_command.* FROM run CROSS JOIN store.robot_command USING (robot_id)"
+     " WHERE kind = 'renew_lease' AND coalesce(last_renewed_at_us, submitted_at_us) >= started_at_us"
+     " AND submitted_at_us < started_at_us AND submitted_at_us >= (SELECT min(submitted_at_us) FROM"
+     " (SELECT submitted_at_us FROM run AS this CROSS JOIN store.command AS made WHERE made.robot_id = this.robot_id"
+     " AND submitted_at_us < this.started_at_us ORDER BY submitted_at_us DESC LIMIT 100))",
+     nullptr, kRenewalsSince},
     {"INSERT INTO command SELECT robot_command.* FROM run JOIN store.robot_command USING (robot_id)"
      " WHERE submitted_at_us >= started_at_us AND submitted_at_us > {1} AND submitted_at_us <= {2}",
      "SELECT max(submitted_at_us) FROM (SELECT submitted_at_us FROM run CROSS JOIN store.command AS made"

@@ -8,7 +8,6 @@
 
 #include "base/version.hpp"
 #include "server/runtime/counted.hpp"
-#include "server/station/state/checked.hpp"
 #include "server/storage/ingest/boot_segments.hpp"
 
 namespace server::storage {
@@ -18,7 +17,6 @@ using namespace std::chrono_literals;
 namespace {
 
 constexpr microseconds kCommitInterval = 100ms;
-constexpr microseconds kOverflowLogInterval = 10s;
 // Boots in one turn of the loop, which must not take over 1 ms; for those that are reported a robot gets a frame each.
 constexpr std::size_t kBootsInATurn = 128;
 constexpr std::size_t kReportsInATurn = 32;
@@ -71,7 +69,8 @@ asio::awaitable<void> Recorder::run() {
 
 asio::awaitable<void> Recorder::wait_for_commit() {
   if (failing()) co_return co_await clock_.sleep_until(failure_.retry_at_us());
-  if (boots_->empty() && queue_->has_no_records() && flushes_.empty() && !quota_.has_left_out()) {
+  const bool has_records = !queue_->has_no_records() || !renewals_.empty() || quota_.has_left_out();
+  if (boots_->empty() && !has_records && flushes_.empty()) {
     idle_ = true;
     co_await work_.wait();
     idle_ = false;
@@ -81,6 +80,7 @@ asio::awaitable<void> Recorder::wait_for_commit() {
 }
 
 void Recorder::build_commit() {
+  enqueue(renewals_.take_ended(clock_.steady_us()));
   record_left_out(false);
   enqueue_due(*boots_, *queue_, clock_.steady_us());
   queue_->build_commit(boots_->with_records());
@@ -150,6 +150,7 @@ asio::awaitable<void> Recorder::ask_for_missing() {
 
 void Recorder::close(const std::function<void(Database&, std::int64_t)>& last) {
   if (!database_.is_open()) return;
+  enqueue(renewals_.take_all());
   record_left_out(true);
   const std::string problem = write_rest();
   if (!problem.empty()) {
@@ -212,104 +213,6 @@ asio::awaitable<std::vector<AdmissionOutcome>> Recorder::ask_database(std::vecto
   co_return co_await on_disk(std::move(job));
 }
 
-void Recorder::on_robot(const station::RobotState& robot) {
-  BootEntry* boot = boots_->find(robot.boot_id);
-  if (boot == nullptr || boot->recording.robot_id() != robot.id) return;
-  boot->connected = robot.link == station::LinkState::connected && !boot->replaced;
-  if (boot->connected && boot->hello) start(*boot);
-  watch(*boot);
-}
-
-void Recorder::start(BootEntry& boot) {
-  BootRegistry::Started started = boots_->start(boot, clock_.utc_us());
-  for (BootEntry* replaced : started.replaced) {
-    queue_->enqueue_segments(*replaced, true);
-    watch(*replaced);
-  }
-  queue_->enqueue_start(boot, std::move(started.start));
-}
-
-void Recorder::on_samples(const station::RobotState& robot, const station::SampleBatch& batch) {
-  BootEntry* boot = boots_->find_recorded(batch.boot_id);
-  if (boot == nullptr) {
-    ++counters_.batches_malformed;
-    return;
-  }
-  const std::size_t added = boot->recording.count_new(batch);
-  counters_.samples_duplicate += batch.samples.size() - added;
-  if (queue_->has_room_for_samples(added)) {
-    boot->recording.append(batch, robot.latest_robot_time_us, clock_.steady_us());
-    queue_->count_received(added);
-  } else {
-    boot->recording.refuse(batch);
-    note_refused(added);
-  }
-  boot->recording.set_lost_below(batch.oldest_seq, "ring_overrun", batch.received_at_us);
-  watch(*boot);
-}
-
-void Recorder::note_refused(std::size_t samples) {
-  counters_.samples_refused += samples;
-  const std::int64_t now_us = clock_.steady_us();
-  if (now_us - overflow_logged_us_ < kOverflowLogInterval.count()) return;
-  overflow_logged_us_ = now_us;
-  spdlog::warn("the disk does not keep up: {} samples wait, {} were refused so far and will be asked for again",
-               queue_->samples(), counters_.samples_refused);
-}
-
-void Recorder::on_unusable_samples(const station::RobotState& robot, std::uint64_t first_seq, std::uint64_t next_seq) {
-  ++counters_.batches_malformed;
-  BootEntry* boot = boots_->find_recorded(robot.boot_id);
-  if (boot == nullptr) return;
-  boot->recording.set_lost({first_seq, next_seq}, "invalid", robot.last_received_at_us);
-  watch(*boot);
-}
-
-void Recorder::on_unusable_event(const station::RobotState& robot, std::uint64_t event_seq) {
-  BootEntry* boot = boots_->find_recorded(robot.boot_id);
-  if (boot == nullptr) return;
-  boot->recording.set_event_lost(event_seq, "invalid", robot.last_received_at_us);
-  watch(*boot);
-}
-
-// SAFETY: whatever waits, since its limits must hold after a restart. One entry for each robot at most.
-void Recorder::on_fluid(const station::RobotState& robot) {
-  queue_->set_fluid(robot.id, robot.fluid);
-  wake();
-}
-
-void Recorder::on_event(const station::RobotState&, const station::RobotEvent& event) {
-  BootEntry* boot = boots_->find_recorded(event.boot_id);
-  if (!event.event_seq) {
-    if (!room_for_record()) return;
-    queue_->enqueue(StoredEvent{boot == nullptr ? 0 : boot->recording.key(), event});
-    return wake();
-  }
-  if (boot == nullptr) return;
-  if (!room_for_record()) {
-    boot->recording.refuse_event(*event.event_seq);
-  } else if (boot->recording.append_event(*event.event_seq)) {
-    queue_->enqueue(StoredEvent{boot->recording.key(), event});
-  }
-  boot->recording.set_events_lost_below(event.oldest_event_seq, "ring_overrun", event.received_at_us);
-  watch(*boot);
-}
-
-void Recorder::on_command(const station::CommandRecord& command) {
-  if (queue_->replace(command)) return;
-  // SAFETY: a stop must be known after a restart, so it is recorded whatever waits.
-  if (command.kind != "emergency_stop" && !room_for_record()) return quota_.leave_out("command");
-  queue_->enqueue(command);
-  wake();
-}
-
-void Recorder::on_audit(const station::AuditNote& note) {
-  wake();
-  if (note.can_flood && !quota_.take(note.action, clock_.steady_us())) return;
-  if (!room_for_record()) return quota_.leave_out(note.action);
-  queue_->enqueue(note);
-}
-
 // What has no entry is an entry, too: nobody can make the audit silent unseen.
 void Recorder::record_left_out(bool at_once) {
   for (const auto& [action, count] : quota_.report(clock_.steady_us(), at_once)) {
@@ -318,33 +221,6 @@ void Recorder::record_left_out(bool at_once) {
     note.detail = fmt::format(R"({{"count":{}}})", count);
     queue_->enqueue(std::move(note));
   }
-}
-
-void Recorder::on_clock(const station::RobotState&, const station::ClockRecord& record) {
-  const std::int64_t boot_key = key_of(record.boot_id);
-  if (boot_key == 0 || !room_for_record()) return;
-  queue_->enqueue(StoredClock{boot_key, record});
-  wake();
-}
-
-void Recorder::on_in_force(const station::RobotState&, const station::InForceRecord& record) {
-  const std::int64_t boot_key = key_of(record.boot_id);
-  if (boot_key == 0 || record.first_seq > station::kMaxRobotNumber || !room_for_record()) return;
-  queue_->enqueue(StoredInForce{boot_key, record});
-  wake();
-}
-
-// 0 unless samples of the boot are recorded now.
-std::int64_t Recorder::key_of(station::BootId boot_id) const {
-  const BootEntry* boot = boots_->find_recorded(boot_id);
-  return boot == nullptr ? 0 : boot->recording.key();
-}
-
-bool Recorder::room_for_record() {
-  if (queue_->has_room_for_record()) return true;
-  if (counters_.records_refused++ == 0)
-    spdlog::error("the disk does not keep up: commands are not recorded, events are asked for again");
-  return false;
 }
 
 void Recorder::watch(BootEntry& boot) {

@@ -42,6 +42,7 @@
 #include "server/storage/commits/checkpointer.hpp"
 #include "server/storage/commits/database_worker.hpp"
 #include "server/storage/ingest/flush_waiters.hpp"
+#include "server/storage/ingest/renewals.hpp"
 #include "server/storage/ingest/robot_admission.hpp"
 #include "server/storage/ingest/write_failure.hpp"
 
@@ -138,7 +139,9 @@ class Recorder final : public station::StationSink, public station::RobotArchive
   void on_samples(const station::RobotState& robot, const station::SampleBatch& batch) override;
   void on_unusable_samples(const station::RobotState& robot, std::uint64_t first_seq, std::uint64_t next_seq) override;
   void on_unusable_event(const station::RobotState& robot, std::uint64_t event_seq) override;
+  void on_event_left_out(const station::RobotState& robot, std::uint64_t event_seq) override;
   void on_event(const station::RobotState& robot, const station::RobotEvent& event) override;
+  // Renewals of a lease in a row become one record: Renewals.
   void on_command(const station::CommandRecord& command) override;
   // Written with the next commit; what can flood is bounded by an AuditQuota.
   void on_audit(const station::AuditNote& note) override;
@@ -181,6 +184,7 @@ class Recorder final : public station::StationSink, public station::RobotArchive
   void watch(BootEntry& boot);
   void note_refused(std::size_t samples);
   bool room_for_record();
+  void enqueue(const Renewals::Records& commands);
   std::int64_t key_of(station::BootId boot_id) const;
   void record_left_out(bool at_once);
 
@@ -208,6 +212,7 @@ class Recorder final : public station::StationSink, public station::RobotArchive
   std::unique_ptr<CommitQueue> queue_;
   FlushWaiters flushes_;
   AuditQuota quota_;
+  Renewals renewals_;
   WriteFailure failure_;
 
   RecorderCounters counters_;

@@ -53,6 +53,14 @@ RecordCursor command_cursor(SQLite::Statement& row) {
   return {row.getColumn(kCommandSubmittedAt).getInt64(), row.getColumn(kCommandId).getInt64()};
 }
 
+const char* renewals_condition(RenewalRows renewals) {
+  switch (renewals) {
+    case RenewalRows::none: return " AND kind <> 'renew_lease'";
+    case RenewalRows::counted: return " AND (kind <> 'renew_lease' OR further_renewals IS NOT 0)";
+    default: return "";
+  }
+}
+
 // As the database has them, without what waits.
 Result<std::vector<RecordedSpan>> read_excerpt(SQLite::Database& database, const Excerpt& excerpt,
                                                std::uint32_t first_span) {
@@ -230,7 +238,7 @@ asio::awaitable<RecordPage<station::CommandRecord>> History::commands(station::R
         "WHERE robot_id = ?1 AND submitted_at_us >= ?2 AND submitted_at_us < ?3"
         " AND (?4 IS NULL OR (submitted_at_us, command_id) < (?4, ?5)){}"
         " ORDER BY submitted_at_us DESC, command_id DESC LIMIT ?6",
-        filter.has_renewals ? "" : " AND kind <> 'renew_lease'");
+        renewals_condition(filter.renewals));
     SQLite::Statement rows{database, select_commands(condition.c_str())};
     return read_records(rows, robot_id, filter, command_from, command_cursor);
   };

@@ -58,12 +58,19 @@ struct RecordCursor {
   std::int64_t row = 0;
 };
 
+// Which commands of kind renew_lease.
+enum class RenewalRows : std::uint8_t {
+  all,
+  none,
+  counted,  // those that others followed, which have no row of their own, or may have followed
+};
+
 // Of the events or the commands of a robot.
 struct RecordFilter {
   std::size_t limit = 100;  // 1 to 1000
   TimeWindow window{std::numeric_limits<std::int64_t>::min(), std::numeric_limits<std::int64_t>::max()};
   std::optional<RecordCursor> before{};
-  bool has_renewals = true;  // false: commands of kind renew_lease are left out
+  RenewalRows renewals = RenewalRows::all;
 };
 
 template <class Record>

@@ -11,6 +11,7 @@ namespace {
 
 // When it came into this state, as far as that is known.
 std::int64_t changed_at_us(const station::CommandRecord& command) {
+  if (command.last_renewed_at_us != 0) return command.last_renewed_at_us;
   if (command.ended_at_us != 0) return command.ended_at_us;
   const std::int64_t after_us = std::max({std::int64_t{0}, command.sent_after_us, command.acknowledged_after_us});
   return command.submitted_at_us + after_us;
@@ -40,6 +41,10 @@ station::AuditNote audit_note_of(const station::CommandRecord& command) {
   add_time("verified_after_us", command.verified_after_us, -1);
   if (command.effect_at_robot_us != 0) detail["effect_at_robot_us"] = command.effect_at_robot_us;
   if (command.emergency_id != 0) detail["emergency_id"] = std::to_string(command.emergency_id);
+  // 0 goes without saying: so it is in entries of before there was a number.
+  const auto& further = command.further_renewals;
+  if (further != 0) detail["further_renewals"] = further ? nlohmann::json(*further) : nlohmann::json(nullptr);
+  add_time("last_renewed_at_us", command.last_renewed_at_us, 0);
   station::AuditNote note;
   note.by = {command.actor, command.peer, changed_at_us(command)};
   note.robot_id = command.robot_id;
@@ -53,15 +58,17 @@ CommandStore::CommandStore(SQLite::Database& database)
     : upsert_{database,
               "INSERT OR REPLACE INTO command (command_id, robot_id, boot_id, kind, arguments, actor, state, reason,"
               " submitted_at_us, sent_at_us, ended_at_us, effect_at_robot_us, emergency_id, sent_after_us,"
-              " acknowledged_after_us, verified_after_us, life_from, peer, audit_entry)"
-              " VALUES (?,?,?,?,?,?,?,?,?,?,?,?,?,nullif(?,-1),nullif(?,-1),nullif(?,-1),?,?,?)"} {}
+              " acknowledged_after_us, verified_after_us, life_from, peer, audit_entry, further_renewals,"
+              " last_renewed_at_us)"
+              " VALUES (?,?,?,?,?,?,?,?,?,?,?,?,?,nullif(?,-1),nullif(?,-1),nullif(?,-1),?,?,?,?,nullif(?,0))"} {}
 
 void CommandStore::write(const station::CommandRecord& command, AuditChain& audit) {
   const std::int64_t entry = audit.append(audit_note_of(command));
   execute(upsert_, command.id, command.robot_id, command.boot_id, command.kind, command.arguments, command.actor,
           text(command.state), command.reason, command.submitted_at_us, command.sent_at_us, command.ended_at_us,
           command.effect_at_robot_us, command.emergency_id, command.sent_after_us, command.acknowledged_after_us,
-          command.verified_after_us, command.life_from, command.peer, entry);
+          command.verified_after_us, command.life_from, command.peer, entry, command.further_renewals,
+          command.last_renewed_at_us);
 }
 
 }  // namespace server::storage

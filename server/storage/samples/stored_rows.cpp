@@ -19,6 +19,7 @@ station::CommandState command_state_from(const std::string& name) {
 }
 
 constexpr const char* kUnfinished = "state IN ('queued', 'sent')";
+constexpr const char* kRestarted = "station_restarted";
 
 }  // namespace
 
@@ -38,7 +39,8 @@ std::string select_commands(const char* condition) {
       "SELECT command_id, robot_id, boot_id, kind, arguments, actor, state, reason, submitted_at_us, sent_at_us,"
       " ended_at_us, effect_at_robot_us, emergency_id, coalesce(sent_after_us, -1), coalesce(acknowledged_after_us, "
       "-1),"
-      " coalesce(verified_after_us, -1), life_from, peer, audit_entry FROM command {}",
+      " coalesce(verified_after_us, -1), life_from, peer, audit_entry, further_renewals,"
+      " coalesce(last_renewed_at_us, 0) FROM command {}",
       condition);
 }
 
@@ -62,6 +64,9 @@ station::CommandRecord command_from(SQLite::Statement& row) {
   command.verified_after_us = row.getColumn(15).getInt64();
   command.life_from = row.getColumn(16).getString();
   command.peer = row.getColumn(17).getString();
+  command.further_renewals.reset();
+  if (!row.getColumn(19).isNull()) command.further_renewals = unsigned_id(row.getColumn(19));
+  command.last_renewed_at_us = row.getColumn(20).getInt64();
   return command;
 }
 
@@ -110,7 +115,21 @@ std::vector<station::CommandRecord> pending_stops(Database& database) {
   return stops;
 }
 
-void fail_unfinished_commands(Database& database, std::int64_t utc_us) {
+namespace {
+
+// How many followed, and until when, nobody knows any more.
+std::vector<station::CommandRecord> renewals_that_went_on(Database& database) {
+  std::vector<station::CommandRecord> renewals;
+  SQLite::Statement query{database.handle(),
+                          select_commands("WHERE further_renewals IS NULL AND reason <> ? ORDER BY submitted_at_us")};
+  query.bind(1, kRestarted);
+  while (query.executeStep()) renewals.push_back(command_from(query));
+  return renewals;
+}
+
+}  // namespace
+
+void end_unfinished_commands(Database& database, std::int64_t utc_us) {
   SQLite::Transaction transaction{database.handle(), SQLite::TransactionBehavior::IMMEDIATE};
   std::vector<station::CommandRecord> unfinished;
   const std::string condition = fmt::format("WHERE kind <> 'emergency_stop' AND {}", kUnfinished);
@@ -121,9 +140,13 @@ void fail_unfinished_commands(Database& database, std::int64_t utc_us) {
   for (station::CommandRecord& command : unfinished) {
     command.state =
         command.state == station::CommandState::sent ? station::CommandState::unknown : station::CommandState::failed;
-    command.reason = "station_restarted";
+    command.reason = kRestarted;
     command.ended_at_us = utc_us;
     commands.write(command, audit);
+  }
+  for (station::CommandRecord& renewal : renewals_that_went_on(database)) {
+    renewal.reason = kRestarted;
+    commands.write(renewal, audit);
   }
   transaction.commit();
 }

@@ -48,7 +48,8 @@ inline constexpr int kEventReceivedAt = 13, kEventRow = 17;
 // Emergency stops that no robot has acknowledged, oldest first.
 std::vector<station::CommandRecord> pending_stops(Database& database);
 
-// Commands other than emergency stops that were on their way when the station stopped: nobody follows them any more.
-void fail_unfinished_commands(Database& database, std::int64_t utc_us);
+// Commands other than emergency stops that were on their way when the station stopped: nobody follows them any more. Of
+// renewals of a lease that went on then, it is stored that their number is not known.
+void end_unfinished_commands(Database& database, std::int64_t utc_us);
 
 }  // namespace server::storage

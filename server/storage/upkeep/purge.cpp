@@ -17,44 +17,24 @@ constexpr int kSegmentSlicesAStep = 25;
 constexpr int kPagesASlice = 16;
 constexpr int kPageSlicesAStep = 16;  // as many pages as they give back go to the write-ahead log, and others
 
-class RetentionGaps {
- public:
-  explicit RetentionGaps(SQLite::Database& database)
-      : before_{database,
-                "SELECT first_seq FROM gap WHERE boot_key = ?1 AND cause = 'retention' AND last_seq = ?2 - 1"
-                " AND first_seq = (SELECT max(first_seq) FROM gap WHERE boot_key = ?1 AND first_seq < ?2)"},
-        after_{database, "SELECT last_seq FROM gap WHERE boot_key = ? AND first_seq = ? AND cause = 'retention'"},
-        remove_{database, "DELETE FROM gap WHERE boot_key = ? AND first_seq = ?"},
-        add_{database,
-             "INSERT INTO gap (boot_key, first_seq, last_seq, cause, noticed_at_us) VALUES (?, ?, ?, 'retention', ?)"} {
-  }
+std::string with_names(const char* sql, const GapTable& table) {
+  return fmt::format(fmt::runtime(sql), table.name, table.first, table.last);
+}
 
-  void add(std::int64_t boot_key, Interval purged, std::int64_t utc_us) {
-    bind_all(after_, boot_key, purged.next);
-    if (after_.executeStep()) {
-      execute(remove_, boot_key, purged.next);
-      purged.next = unsigned_id(after_.getColumn(0)) + 1;
-    }
-    bind_all(before_, boot_key, purged.first);
-    if (before_.executeStep()) {
-      purged.first = unsigned_id(before_.getColumn(0));
-      execute(remove_, boot_key, purged.first);
-    }
-    after_.reset();
-    before_.reset();
-    execute(add_, boot_key, purged.first, purged.next - 1, utc_us);
-  }
-
- private:
-  SQLite::Statement before_, after_, remove_, add_;
-};
+constexpr const char* kGapBefore =
+    "SELECT {1} FROM {0} WHERE boot_key = ?1 AND cause = 'retention' AND {2} = ?2 - 1"
+    " AND {1} = (SELECT max({1}) FROM {0} WHERE boot_key = ?1 AND {1} < ?2)";
+constexpr const char* kGapAfter = "SELECT {2} FROM {0} WHERE boot_key = ? AND {1} = ? AND cause = 'retention'";
+constexpr const char* kRemoveGap = "DELETE FROM {0} WHERE boot_key = ? AND {1} = ?";
+constexpr const char* kAddGap =
+    "INSERT INTO {0} (boot_key, {1}, {2}, cause, noticed_at_us) VALUES (?, ?, ?, 'retention', ?)";
 
 class Purge {
  public:
   explicit Purge(SQLite::Database& database)
       : rows_{database, "DELETE FROM sample WHERE row BETWEEN ? AND ?"},
         segment_{database, "DELETE FROM segment WHERE boot_key = ? AND first_seq = ?"},
-        gaps_{database} {}
+        gaps_{database, {"gap", "first_seq", "last_seq"}} {}
 
   // Segments of one boot, ascending.
   void remove(const std::vector<StoredSegment>& segments, std::int64_t utc_us) {
@@ -74,6 +54,28 @@ class Purge {
 };
 
 }  // namespace
+
+RetentionGaps::RetentionGaps(SQLite::Database& database, const GapTable& table)
+    : before_{database, with_names(kGapBefore, table)},
+      after_{database, with_names(kGapAfter, table)},
+      remove_{database, with_names(kRemoveGap, table)},
+      add_{database, with_names(kAddGap, table)} {}
+
+void RetentionGaps::add(std::int64_t boot_key, Interval purged, std::int64_t utc_us) {
+  bind_all(after_, boot_key, purged.next);
+  if (after_.executeStep()) {
+    execute(remove_, boot_key, purged.next);
+    purged.next = unsigned_id(after_.getColumn(0)) + 1;
+  }
+  bind_all(before_, boot_key, purged.first);
+  if (before_.executeStep()) {
+    purged.first = unsigned_id(before_.getColumn(0));
+    execute(remove_, boot_key, purged.first);
+  }
+  after_.reset();
+  before_.reset();
+  execute(add_, boot_key, purged.first, purged.next - 1, utc_us);
+}
 
 std::uint64_t purge_step(SQLite::Database& database, RetentionPlan& plan, const runtime::Clock& clock,
                          std::int64_t utc_us) {

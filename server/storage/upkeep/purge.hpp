@@ -9,6 +9,7 @@
 #include <cstdint>
 
 #include "server/runtime/clock.hpp"
+#include "server/storage/samples/interval_set.hpp"
 #include "server/storage/upkeep/retention_plan.hpp"
 
 namespace server::storage {
@@ -26,5 +27,23 @@ std::uint64_t purge_step(SQLite::Database& database, RetentionPlan& plan, const 
 // Makes the file shorter by free pages, in slices of a few, with a look at the clock between them. Returns how many; 0
 // when none is left. One transaction.
 std::uint64_t shrink_step(SQLite::Database& database, const runtime::Clock& clock);
+
+// Gaps of cause `retention`, of samples or of events: one that touches a new one becomes one with it. In the caller's
+// transaction.
+struct GapTable {
+  const char* name;
+  const char* first;  // columns
+  const char* last;
+};
+
+class RetentionGaps {
+ public:
+  RetentionGaps(SQLite::Database& database, const GapTable& table);
+
+  void add(std::int64_t boot_key, Interval purged, std::int64_t utc_us);
+
+ private:
+  SQLite::Statement before_, after_, remove_, add_;
+};
 
 }  // namespace server::storage

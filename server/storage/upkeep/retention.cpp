@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <string>
 
+#include "server/storage/upkeep/event_purge.hpp"
 #include "server/storage/upkeep/purge.hpp"
 
 namespace server::storage {
@@ -19,13 +20,14 @@ constexpr microseconds kLookInterval = 30s;
 constexpr microseconds kPause = 10ms;  // at least, between two steps
 constexpr microseconds kPauseWhenBehind = 1s;
 constexpr std::int64_t kDayUs = 86'400'000'000;
+constexpr const char* kNextEventRow = "SELECT coalesce(max(event_row), 0) + 1 FROM event";
 // The database is made smaller from this part of its limit on, to that part: so that the file need not grow over it.
 constexpr std::uint64_t kBeginPercent = 95;
 constexpr std::uint64_t kEndPercent = 90;
 
 struct Step {
   std::string problem;
-  std::uint64_t done = 0;  // samples removed, or pages given back
+  std::uint64_t done = 0;  // samples or events removed, or pages given back
   std::int64_t took_us = 0;
 };
 
@@ -57,9 +59,13 @@ Retention::Retention(runtime::Clock& clock, Recorder& recorder, DatabaseReader& 
       disk_watch_{disk_watch},
       references_{references},
       policy_{policy},
-      ages_{clock, policy.retention_days * kDayUs} {}
+      ages_{clock, policy.retention_days * kDayUs},
+      event_ages_{clock, policy.event_retention_days * kDayUs} {}
 
-asio::awaitable<void> Retention::open() { ages_.begin(co_await next_row()); }
+asio::awaitable<void> Retention::open() {
+  ages_.begin(co_await next_row());
+  event_ages_.begin(co_await next_event_row());
+}
 
 asio::awaitable<void> Retention::run() {
   for (;;) {
@@ -80,6 +86,7 @@ asio::awaitable<void> Retention::pass() {
     RetentionPlan plan{ages_.limit()};
     co_await purge(std::move(plan), 0);
   }
+  if (policy_.event_retention_days > 0) co_await purge_events();
   if (policy_.max_database_bytes > 0) co_await purge_down_to_size();
   const bool low = disk_watch_.state() != SpaceState::ok;
   if (policy_.max_database_bytes > 0 || low) co_await shrink();
@@ -107,6 +114,26 @@ asio::awaitable<bool> Retention::purge(RetentionPlan plan, std::uint64_t until_u
   co_return true;
 }
 
+asio::awaitable<void> Retention::purge_events() {
+  event_ages_.note(co_await next_event_row());
+  if (clock_.steady_us() < events_due_at_us_) co_return;
+  EventPurge purge{event_ages_.limit()};
+  while (!purge.is_done()) {
+    auto job = [this, &purge, now_us = clock_.utc_us()](Database& database) {
+      return measured(clock_, [&] { return purge.step(database.handle(), clock_, now_us); });
+    };
+    const Step step = co_await recorder_.on_disk(std::move(job));
+    if (!step.problem.empty()) {
+      spdlog::warn("old events cannot be removed now: {}", step.problem);
+      co_return;
+    }
+    counters_.events_purged += step.done;
+    counters_.longest_step_us = std::max(counters_.longest_step_us, step.took_us);
+    co_await make_room_for_commits(step.took_us);
+  }
+  events_due_at_us_ = clock_.steady_us() + kDayUs;
+}
+
 asio::awaitable<void> Retention::purge_down_to_size() {
   const std::uint64_t limit = policy_.max_database_bytes;
   Size now = co_await size();
@@ -117,6 +144,11 @@ asio::awaitable<void> Retention::purge_down_to_size() {
     now = co_await size();
   }
   note_use(now.used_bytes);
+}
+
+asio::awaitable<std::int64_t> Retention::next_event_row() {
+  auto query = [](SQLite::Database& database) { return database.execAndGet(kNextEventRow).getInt64(); };
+  co_return co_await reader_.ask(std::move(query));
 }
 
 void Retention::note_use(std::uint64_t used_bytes) {

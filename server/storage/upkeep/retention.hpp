@@ -1,10 +1,10 @@
-// Removes samples over the limits of age or size: those that no run holds, the oldest first. Positions that were
-// measured from outside go as soon as their run is discarded, or they are replaced.
+// Removes samples over the limits of age or size, and events over that of age: those that no run holds, the oldest
+// first. Positions that were measured from outside go as soon as their run is discarded, or they are replaced.
 //
-// What may go is found on a reader. It goes in steps of one transaction on the disk thread, each of which ends by the
-// clock, well before 50 ms. Commits go in between, and at least half of the disk thread's time is theirs. Removed pages
-// are used again; the file shrinks only while it is larger than it may be, or while there is little room on the disk.
-// Loop thread. What it is given outlives it.
+// What may go is found on a reader, of events on the way. It goes in steps of one transaction on the disk thread, each
+// of which ends by the clock, well before 50 ms. Commits go in between, and at least half of the disk thread's time is
+// theirs. Removed pages are used again; the file shrinks only while it is larger than it may be, or while there is
+// little room on the disk. Loop thread. What it is given outlives it.
 #pragma once
 
 #include <boost/asio/awaitable.hpp>
@@ -21,13 +21,15 @@
 namespace server::storage {
 
 struct RetentionPolicy {
-  std::uint32_t retention_days = 0;      // 0: for ever
-  std::uint64_t max_database_bytes = 0;  // 0: no limit
+  std::uint32_t retention_days = 0;        // of samples; 0: for ever
+  std::uint32_t event_retention_days = 0;  // likewise
+  std::uint64_t max_database_bytes = 0;    // 0: no limit
 };
 
 // Since the start of the program.
 struct RetentionCounters {
   std::uint64_t samples_purged = 0;
+  std::uint64_t events_purged = 0;
   std::uint64_t pages_returned = 0;  // to the file system
   std::int64_t longest_step_us = 0;
   bool all_held = false;  // the database is larger than it may be, and runs hold all that is left
@@ -56,11 +58,14 @@ class Retention {
   };
   // False: the disk fails.
   boost::asio::awaitable<bool> purge(RetentionPlan plan, std::uint64_t until_used_bytes);
+  // Once a day, so that the audit gets few entries of it.
+  boost::asio::awaitable<void> purge_events();
   boost::asio::awaitable<void> purge_down_to_size();
   void note_use(std::uint64_t used_bytes);  // after what could go has gone
   boost::asio::awaitable<void> shrink();
   boost::asio::awaitable<Size> size();
   boost::asio::awaitable<std::int64_t> next_row();
+  boost::asio::awaitable<std::int64_t> next_event_row();
   boost::asio::awaitable<void> make_room_for_commits(std::int64_t took_us);
 
   runtime::Clock& clock_;
@@ -70,6 +75,8 @@ class Retention {
   OutsideReferences& references_;
   RetentionPolicy policy_;
   SampleAges ages_;
+  SampleAges event_ages_;              // of rows of events
+  std::int64_t events_due_at_us_ = 0;  // steady
   RetentionCounters counters_;
 };
 

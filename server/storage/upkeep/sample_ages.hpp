@@ -1,4 +1,4 @@
-// How long ago samples were stored, independent of changes of the station's clock.
+// How long ago samples, or events, were stored, independent of changes of the station's clock.
 //
 // Rows are numbered in the order in which they are written. So it is enough to note, from time to time, the steady time
 // and the number of the next row: all below it are older than the note. What an earlier start of the program has

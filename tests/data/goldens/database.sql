@@ -1,5 +1,5 @@
 PRAGMA application_id = 1382573423;
-PRAGMA user_version = 9;
+PRAGMA user_version = 10;
 BEGIN;
 CREATE TABLE api_token (
   name TEXT PRIMARY KEY,
@@ -133,27 +133,27 @@ CREATE TABLE command (
   ended_at_us INTEGER NOT NULL,
   effect_at_robot_us INTEGER NOT NULL,
   emergency_id INTEGER NOT NULL
-, sent_after_us INTEGER, acknowledged_after_us INTEGER, verified_after_us INTEGER, life_from TEXT NOT NULL DEFAULT '', peer TEXT NOT NULL DEFAULT '', audit_entry INTEGER);
-INSERT INTO command VALUES(-8882435919750266709,'r1',-81985529216486895,'set_duty','{"duty":-0.9}','token:local','rejected','unknown_40',1795575967158000,1795575967158000,1795575967158000,6158000,0,0,NULL,NULL,'arrival','127.0.0.1',29);
-INSERT INTO command VALUES(-7827675127045402757,'r1',-81985529216486895,'set_parameter','{"name":"duty_slew_per_s","value":0.1}','token:local','failed','read_back_differs',1795575967308000,1795575967308000,1795575967308000,6308000,0,0,0,NULL,'arrival','127.0.0.1',39);
-INSERT INTO command VALUES(-6705686484363746538,'r1',-81985529216486895,'clear_emergency','{"emergency_id":"18446744073709551615"}','token:local','verified','',1795575970508000,1795575970508000,1795575970508000,9508000,0,0,0,0,'arrival','127.0.0.1',45);
-INSERT INTO command VALUES(-6268013896294600435,'r1',-81985529216486895,'set_mode','{"mode":"auto","setpoint_m":0.125}','token:local','verified','',1795575967158000,1795575967158000,1795575967158000,6158000,0,0,0,0,'arrival','127.0.0.1',34);
-INSERT INTO command VALUES(-5382347917484077799,'r1',-81985529216486895,'set_duty','{"duty":0.1}','token:local','rejected','busy',1795575967158000,1795575967158000,1795575967158000,6158000,0,0,NULL,NULL,'arrival','127.0.0.1',28);
-INSERT INTO command VALUES(-5124034344348545391,'nemo',-81985529216486896,'set_mode','{"mode":"auto","setpoint_m":0.05}','token:local','verified','',1795427313443794,1795427313443877,1795427313446720,58302,0,218,377,3060,'arrival','127.0.0.1',7);
-INSERT INTO command VALUES(-4337222557917806714,'r1',-81985529216486895,'set_duty','{"duty":0.2}','token:local','expired','expired',1795575967158000,1795575967158000,1795575967158000,6158000,0,0,NULL,NULL,'arrival','127.0.0.1',30);
-INSERT INTO command VALUES(-2874830194785090132,'r1',-81985529216486895,'ping','{}','token:local','acknowledged','duplicate',1795575967158000,1795575967158000,1795575967158000,6158000,0,0,0,NULL,'arrival','127.0.0.1',32);
-INSERT INTO command VALUES(-2665743766357565737,'r1',-81985529216486895,'ping','{}','token:local','rejected','other_boot',1795575967158000,1795575967158000,1795575967158000,6158000,0,0,NULL,NULL,'arrival','127.0.0.1',33);
-INSERT INTO command VALUES(-2487110880056020375,'r1',-81985529216486895,'set_setpoint','{"execute_at_robot_us":6808000,"setpoint_m":0.1}','token:local','superseded','by_an_emergency',1795575967308000,1795575967308000,1795575970458000,6308000,0,0,0,NULL,'arrival','127.0.0.1',44);
-INSERT INTO command VALUES(-1299867002884968598,'r1',-81985529216486895,'set_setpoint','{"setpoint_m":0.2}','token:local','superseded','by_an_emergency',1795575967208000,1795575967208000,1795575970458000,6208000,0,0,0,NULL,'arrival','127.0.0.1',43);
-INSERT INTO command VALUES(-1273923334512494478,'r1',1,'emergency_stop','{}','token:local','queued','',1795575986008000,0,0,0,0,NULL,NULL,NULL,'','127.0.0.1',54);
-INSERT INTO command VALUES(363817169286639039,'nemo',-81985529216486896,'inject_disturbance','{"disturbance_m":0.01}','token:local','verified','',1795427313800715,1795427313800790,1795427313805906,415163,0,195,325,5310,'arrival','127.0.0.1',8);
-INSERT INTO command VALUES(3207296026000306913,'r2',-9223372036854775808,'drop_timed','{}','station:control','unknown','link_lost',1795579566000000,1795579566000000,1795579572000000,0,0,0,NULL,NULL,'arrival','',61);
-INSERT INTO command VALUES(3775962213208117092,'r1',-81985529216486895,'ping','{}','token:local','acknowledged','',1795575967158000,1795575967158000,1795575967158000,6158000,0,0,0,NULL,'arrival','127.0.0.1',31);
-INSERT INTO command VALUES(4416111773988408078,'nemo',-81985529216486896,'emergency_stop','{}','token:local','verified','',1795427314152355,1795427314152418,1795427314155883,766783,3754034430445196131,144,275,3607,'','127.0.0.1',9);
-INSERT INTO command VALUES(4670970265874846992,'r1',-81985529216486895,'emergency_stop','{}','token:local','verified','',1795575970458000,1795575970458000,1795575970458000,9458000,-1,0,0,0,'','127.0.0.1',42);
-INSERT INTO command VALUES(6073503041918755660,'r1',-81985529216486895,'set_setpoint','{"setpoint_m":0.25}','token:local','verified','',1795575967208000,1795575967208000,1795575967258000,6208000,0,0,0,50000,'arrival','127.0.0.1',37);
-INSERT INTO command VALUES(7617890157137703680,'r1',-81985529216486895,'ping','{}','token:local','unknown','no_answer',1795575967308000,1795575967308000,1795575967458000,0,0,0,NULL,NULL,'arrival','127.0.0.1',41);
-INSERT INTO command VALUES(7847316756723005070,'nemo',-81985529216486896,'clear_emergency','{"emergency_id":"3754034430445196131"}','token:local','verified','',1795427316569096,1795427316569186,1795427316576026,3183534,0,209,314,7048,'arrival','127.0.0.1',12);
+, sent_after_us INTEGER, acknowledged_after_us INTEGER, verified_after_us INTEGER, life_from TEXT NOT NULL DEFAULT '', peer TEXT NOT NULL DEFAULT '', audit_entry INTEGER, further_renewals INTEGER DEFAULT 0, last_renewed_at_us INTEGER);
+INSERT INTO command VALUES(-8882435919750266709,'r1',-81985529216486895,'set_duty','{"duty":-0.9}','token:local','rejected','unknown_40',1795575967158000,1795575967158000,1795575967158000,6158000,0,0,NULL,NULL,'arrival','127.0.0.1',29,0,NULL);
+INSERT INTO command VALUES(-7827675127045402757,'r1',-81985529216486895,'set_parameter','{"name":"duty_slew_per_s","value":0.1}','token:local','failed','read_back_differs',1795575967308000,1795575967308000,1795575967308000,6308000,0,0,0,NULL,'arrival','127.0.0.1',39,0,NULL);
+INSERT INTO command VALUES(-6705686484363746538,'r1',-81985529216486895,'clear_emergency','{"emergency_id":"18446744073709551615"}','token:local','verified','',1795575970508000,1795575970508000,1795575970508000,9508000,0,0,0,0,'arrival','127.0.0.1',45,0,NULL);
+INSERT INTO command VALUES(-6268013896294600435,'r1',-81985529216486895,'set_mode','{"mode":"auto","setpoint_m":0.125}','token:local','verified','',1795575967158000,1795575967158000,1795575967158000,6158000,0,0,0,0,'arrival','127.0.0.1',34,0,NULL);
+INSERT INTO command VALUES(-5382347917484077799,'r1',-81985529216486895,'set_duty','{"duty":0.1}','token:local','rejected','busy',1795575967158000,1795575967158000,1795575967158000,6158000,0,0,NULL,NULL,'arrival','127.0.0.1',28,0,NULL);
+INSERT INTO command VALUES(-5124034344348545391,'nemo',-81985529216486896,'set_mode','{"mode":"auto","setpoint_m":0.05}','token:local','verified','',1795427313443794,1795427313443877,1795427313446720,58302,0,218,377,3060,'arrival','127.0.0.1',7,0,NULL);
+INSERT INTO command VALUES(-4337222557917806714,'r1',-81985529216486895,'set_duty','{"duty":0.2}','token:local','expired','expired',1795575967158000,1795575967158000,1795575967158000,6158000,0,0,NULL,NULL,'arrival','127.0.0.1',30,0,NULL);
+INSERT INTO command VALUES(-2874830194785090132,'r1',-81985529216486895,'ping','{}','token:local','acknowledged','duplicate',1795575967158000,1795575967158000,1795575967158000,6158000,0,0,0,NULL,'arrival','127.0.0.1',32,0,NULL);
+INSERT INTO command VALUES(-2665743766357565737,'r1',-81985529216486895,'ping','{}','token:local','rejected','other_boot',1795575967158000,1795575967158000,1795575967158000,6158000,0,0,NULL,NULL,'arrival','127.0.0.1',33,0,NULL);
+INSERT INTO command VALUES(-2487110880056020375,'r1',-81985529216486895,'set_setpoint','{"execute_at_robot_us":6808000,"setpoint_m":0.1}','token:local','superseded','by_an_emergency',1795575967308000,1795575967308000,1795575970458000,6308000,0,0,0,NULL,'arrival','127.0.0.1',44,0,NULL);
+INSERT INTO command VALUES(-1299867002884968598,'r1',-81985529216486895,'set_setpoint','{"setpoint_m":0.2}','token:local','superseded','by_an_emergency',1795575967208000,1795575967208000,1795575970458000,6208000,0,0,0,NULL,'arrival','127.0.0.1',43,0,NULL);
+INSERT INTO command VALUES(-1273923334512494478,'r1',1,'emergency_stop','{}','token:local','queued','',1795575986008000,0,0,0,0,NULL,NULL,NULL,'','127.0.0.1',54,0,NULL);
+INSERT INTO command VALUES(363817169286639039,'nemo',-81985529216486896,'inject_disturbance','{"disturbance_m":0.01}','token:local','verified','',1795427313800715,1795427313800790,1795427313805906,415163,0,195,325,5310,'arrival','127.0.0.1',8,0,NULL);
+INSERT INTO command VALUES(3207296026000306913,'r2',-9223372036854775808,'drop_timed','{}','station:control','unknown','link_lost',1795579566000000,1795579566000000,1795579572000000,0,0,0,NULL,NULL,'arrival','',61,0,NULL);
+INSERT INTO command VALUES(3775962213208117092,'r1',-81985529216486895,'ping','{}','token:local','acknowledged','',1795575967158000,1795575967158000,1795575967158000,6158000,0,0,0,NULL,'arrival','127.0.0.1',31,0,NULL);
+INSERT INTO command VALUES(4416111773988408078,'nemo',-81985529216486896,'emergency_stop','{}','token:local','verified','',1795427314152355,1795427314152418,1795427314155883,766783,3754034430445196131,144,275,3607,'','127.0.0.1',9,0,NULL);
+INSERT INTO command VALUES(4670970265874846992,'r1',-81985529216486895,'emergency_stop','{}','token:local','verified','',1795575970458000,1795575970458000,1795575970458000,9458000,-1,0,0,0,'','127.0.0.1',42,0,NULL);
+INSERT INTO command VALUES(6073503041918755660,'r1',-81985529216486895,'set_setpoint','{"setpoint_m":0.25}','token:local','verified','',1795575967208000,1795575967208000,1795575967258000,6208000,0,0,0,50000,'arrival','127.0.0.1',37,0,NULL);
+INSERT INTO command VALUES(7617890157137703680,'r1',-81985529216486895,'ping','{}','token:local','unknown','no_answer',1795575967308000,1795575967308000,1795575967458000,0,0,0,NULL,NULL,'arrival','127.0.0.1',41,0,NULL);
+INSERT INTO command VALUES(7847316756723005070,'nemo',-81985529216486896,'clear_emergency','{"emergency_id":"3754034430445196131"}','token:local','verified','',1795427316569096,1795427316569186,1795427316576026,3183534,0,209,314,7048,'arrival','127.0.0.1',12,0,NULL);
 CREATE TABLE document (             -- a text that was in force; equal texts are stored once
   document_key INTEGER PRIMARY KEY,
   kind TEXT NOT NULL,               -- controller, parameters, station
@@ -1099,11 +1099,6 @@ SELECT boot.robot_id, printf('%llu', boot.boot_id) AS boot_id, clock_estimate.ro
   clock_estimate.robot_time_us + clock_estimate.utc_offset_us AS utc_us, clock_estimate.utc_offset_us,
   clock_estimate.uncertainty_us, clock_estimate.drift_ppm, clock_estimate.round_trip_us, clock_estimate.station_step_us
 FROM clock_estimate JOIN boot USING (boot_key);
-CREATE VIEW robot_command AS
-SELECT printf('%llu', command_id) AS command_id, robot_id, printf('%llu', boot_id) AS boot_id, kind, arguments, actor,
-  state, reason, submitted_at_us, sent_at_us, ended_at_us, effect_at_robot_us,
-  printf('%llu', emergency_id) AS emergency_id, sent_after_us, acknowledged_after_us, verified_after_us, life_from
-FROM command;
 CREATE INDEX audit_by_time ON audit(at_us);
 CREATE TRIGGER audit_in_order BEFORE INSERT ON audit
 WHEN NEW.entry IS NOT (SELECT coalesce(max(entry), 0) + 1 FROM audit)
@@ -1184,4 +1179,12 @@ BEGIN DELETE FROM segment_group WHERE boot_key = OLD.boot_key AND last_seq >= OL
   AND first_seq = (SELECT max(first_seq) FROM segment_group
                    WHERE boot_key = OLD.boot_key AND first_seq <= OLD.first_seq); END;
 CREATE INDEX event_by_time ON event(robot_id, received_at_us);
+CREATE INDEX command_renewed ON command(command_id) WHERE further_renewals IS NULL;
+CREATE VIEW robot_command AS
+SELECT printf('%llu', command_id) AS command_id, robot_id, printf('%llu', boot_id) AS boot_id, kind, arguments, actor,
+  state, reason, submitted_at_us, sent_at_us, ended_at_us, effect_at_robot_us,
+  printf('%llu', emergency_id) AS emergency_id, sent_after_us, acknowledged_after_us, verified_after_us, life_from,
+  further_renewals, last_renewed_at_us
+FROM command;
+CREATE INDEX run_span_by_boot ON run_span(boot_key);
 COMMIT;

@@ -109,7 +109,7 @@ CREATE TABLE command (
   ended_at_us INTEGER NOT NULL,
   effect_at_robot_us INTEGER NOT NULL,
   emergency_id INTEGER NOT NULL
-, sent_after_us INTEGER, acknowledged_after_us INTEGER, verified_after_us INTEGER, life_from TEXT NOT NULL DEFAULT '', peer TEXT NOT NULL DEFAULT '', audit_entry INTEGER);
+, sent_after_us INTEGER, acknowledged_after_us INTEGER, verified_after_us INTEGER, life_from TEXT NOT NULL DEFAULT '', peer TEXT NOT NULL DEFAULT '', audit_entry INTEGER, further_renewals INTEGER DEFAULT 0, last_renewed_at_us INTEGER);
 CREATE INDEX command_by_robot ON command(robot_id, submitted_at_us);
 CREATE INDEX command_unfinished ON command(kind) WHERE state IN ('queued', 'sent');
 CREATE TABLE run (
@@ -249,11 +249,6 @@ SELECT boot.robot_id, printf('%llu', boot.boot_id) AS boot_id, clock_estimate.ro
   clock_estimate.robot_time_us + clock_estimate.utc_offset_us AS utc_us, clock_estimate.utc_offset_us,
   clock_estimate.uncertainty_us, clock_estimate.drift_ppm, clock_estimate.round_trip_us, clock_estimate.station_step_us
 FROM clock_estimate JOIN boot USING (boot_key);
-CREATE VIEW robot_command AS
-SELECT printf('%llu', command_id) AS command_id, robot_id, printf('%llu', boot_id) AS boot_id, kind, arguments, actor,
-  state, reason, submitted_at_us, sent_at_us, ended_at_us, effect_at_robot_us,
-  printf('%llu', emergency_id) AS emergency_id, sent_after_us, acknowledged_after_us, verified_after_us, life_from
-FROM command;
 CREATE TABLE user (
   name TEXT PRIMARY KEY,
   role TEXT NOT NULL CHECK (role IN ('viewer', 'operator', 'admin')),
@@ -522,3 +517,11 @@ BEGIN DELETE FROM segment_group WHERE boot_key = OLD.boot_key AND last_seq >= OL
   AND first_seq = (SELECT max(first_seq) FROM segment_group
                    WHERE boot_key = OLD.boot_key AND first_seq <= OLD.first_seq); END;
 CREATE INDEX event_by_time ON event(robot_id, received_at_us);
+CREATE INDEX command_renewed ON command(command_id) WHERE further_renewals IS NULL;
+CREATE VIEW robot_command AS
+SELECT printf('%llu', command_id) AS command_id, robot_id, printf('%llu', boot_id) AS boot_id, kind, arguments, actor,
+  state, reason, submitted_at_us, sent_at_us, ended_at_us, effect_at_robot_us,
+  printf('%llu', emergency_id) AS emergency_id, sent_after_us, acknowledged_after_us, verified_after_us, life_from,
+  further_renewals, last_renewed_at_us
+FROM command;
+CREATE INDEX run_span_by_boot ON run_span(boot_key);

@@ -36,6 +36,8 @@ TEST_F(RecordingRoutesTest, ReportsWhatWasRecordedAndHowMuchRoomThereIs) {
   EXPECT_EQ(health["queued_samples"], 0);
   EXPECT_EQ(health["counters"]["samples_written"], 20);
   EXPECT_EQ(health["retention"]["retention_days"], 0);
+  EXPECT_EQ(health["retention"]["event_retention_days"], 0);
+  EXPECT_EQ(health["retention"]["events_purged"], 0);
   EXPECT_EQ(health["retention"]["all_held"], false);
 }
 

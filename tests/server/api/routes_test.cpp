@@ -72,6 +72,9 @@ TEST_F(RoutesTest, AnAcknowledgedCommandIs200WithItsRecord) {
   const std::string id = record["command_id"];
   EXPECT_EQ(ask("GET", "/api/v1/commands/" + id).parsed()["state"], "acknowledged");
   EXPECT_EQ(ask("GET", "/api/v1/robots/r1/commands?limit=5").parsed()["commands"].size(), 1U);
+  EXPECT_EQ(ask("GET", "/api/v1/robots/r1/commands?renewals=counted").parsed()["commands"].size(), 1U);
+  EXPECT_EQ(ask("GET", "/api/v1/robots/r1/commands?renewals=some").parsed()["detail"],
+            "renewals = 'some' is not true, false or counted");
 }
 
 TEST_F(RoutesTest, ARefusedCommandIs409WithReasonAndRecord) {

@@ -117,6 +117,23 @@ TEST_F(ControlTest, ARenewalOfAnotherKeepsNoMotorRunning) {
   EXPECT_EQ(robot->commands().size(), 1u);
 }
 
+TEST_F(ControlTest, TheStateHasTheTimeOfTheLatestRenewalThatTheRobotAccepted) {
+  auto* robot = connect();
+  submit_as("session:1", set_duty(0.1F));
+  protocol::Command renewal = rheonaut_Command_init_zero;
+  renewal.which_action = rheonaut_Command_renew_lease_tag;
+  submit_as("session:1", renewal);
+  robot->acknowledge(robot->commands().back(), rheonaut_COMMAND_RESULT_REJECTED, 0,
+                     rheonaut_REJECT_REASON_NOTHING_TO_RENEW);
+  clock.settle();
+  EXPECT_EQ(station.find("r1")->lease_renewed_at_us, 0);
+  submit_as("session:1", renewal);
+  clock.run_for(20ms);
+  robot->acknowledge(robot->commands().back(), rheonaut_COMMAND_RESULT_ACCEPTED);
+  clock.settle();
+  EXPECT_EQ(station.find("r1")->lease_renewed_at_us, clock.utc_us());
+}
+
 TEST_F(ControlTest, EveryoneMayStop) {
   auto* robot = connect();
   submit_as("session:1", set_duty(0.1F));

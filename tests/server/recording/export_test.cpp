@@ -132,7 +132,7 @@ TEST_F(ExportTest, TablesOfAnyLengthAreCopiedInSlices) {
   make(robot_, 10);
   station::CommandRecord command;
   command.robot_id = robot_.id;
-  command.kind = "renew_lease";
+  command.kind = "ping";
   command.arguments = "{}";
   command.id = 1;
   command.submitted_at_us = clock_.utc_us() - 1;
@@ -177,6 +177,37 @@ TEST_F(ExportTest, TablesOfAnyLengthAreCopiedInSlices) {
   EXPECT_EQ(made.execAndGet("SELECT count(DISTINCT event_row) FROM event").getInt64(), kEvents);
   EXPECT_EQ(made.execAndGet("SELECT count(DISTINCT command_id) FROM command").getInt64(), kCommands);
   EXPECT_EQ(made.execAndGet("SELECT count(*) FROM command").getInt64(), kCommands);
+}
+
+TEST_F(ExportTest, RenewalsThatBeganBeforeTheRunAndWentOnInItAreInItsFile) {
+  start();
+  connect(robot_);
+  make(robot_, 10);
+  const auto renew = [this](station::CommandId id) {
+    station::CommandRecord renewal;
+    renewal.id = id;
+    renewal.robot_id = robot_.id;
+    renewal.kind = "renew_lease";
+    renewal.arguments = "{}";
+    renewal.submitted_at_us = clock_.utc_us();
+    recorder_->on_command(renewal);
+    renewal.state = station::CommandState::acknowledged;
+    renewal.ended_at_us = clock_.utc_us();
+    recorder_->on_command(renewal);
+    clock_.run_for(150ms);
+  };
+  for (station::CommandId id = 1; id <= 3; ++id) renew(id);
+  clock_.run_for(2s);
+  for (station::CommandId id = 11; id <= 13; ++id) renew(id);
+  const storage::RunId run = wait(runs_->create(robot_.id, named("held")))->id;
+  for (station::CommandId id = 14; id <= 16; ++id) renew(id);
+  clock_.run_for(2s);
+  make(robot_, 10);
+  flush();
+  wait(recorder_->flush_records());
+  SQLite::Database database{run_file(run).string(), SQLite::OPEN_READONLY};
+  EXPECT_EQ(database.execAndGet("SELECT group_concat(command_id || ' ' || further_renewals) FROM command").getString(),
+            "11 5");
 }
 
 TEST_F(ExportTest, AGridAndChosenChannelsAreTheSameInCsvAndMat) {

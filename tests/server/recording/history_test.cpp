@@ -270,7 +270,8 @@ TEST_F(HistoryTest, EventsAndCommandsOfAWindowOfTimeAndCommandsWithoutRenewals) 
   EXPECT_EQ(events[0].kind, "event 3");
   EXPECT_EQ(events[1].kind, "event 2");
   EXPECT_EQ(wait(history_->commands(robot_.id, {.window = window})).records.size(), 2u);
-  const auto without = wait(history_->commands(robot_.id, {.limit = 1, .has_renewals = false})).records;
+  const auto without =
+      wait(history_->commands(robot_.id, {.limit = 1, .renewals = storage::RenewalRows::none})).records;
   ASSERT_EQ(without.size(), 1u) << "renewals do not count";
   EXPECT_EQ(without[0].id, 2u);
 }

@@ -15,8 +15,9 @@ using Rows = std::vector<std::string>;
 
 class RetentionTest : public RecordingTest {
  protected:
-  void keep(std::uint32_t days, std::uint32_t megabytes = 0) {
+  void keep(std::uint32_t days, std::uint32_t megabytes = 0, std::uint32_t event_days = 0) {
     start({}, {.retention_days = days,
+               .event_retention_days = event_days,
                .max_database_mb = megabytes,
                .low_space_mb = 0,
                .critical_space_mb = 0,

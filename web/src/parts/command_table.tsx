@@ -7,7 +7,7 @@ import { clock_time, milliseconds_of_us, words } from '../format';
 import { sentence } from '../reasons';
 import type { Robot } from '../robot';
 import type { Session } from '../session';
-import { arguments_text } from './log_strip';
+import { arguments_text, renewals_text } from './log_strip';
 import { NewestCommands } from './newest_commands';
 
 export function CommandTable({ session, robot }: { session: Session; robot: Robot }) {
@@ -95,7 +95,7 @@ function Row({ command }: { command: CommandRecord }) {
       <td>
         <time>{clock_time(command.submitted_at_us / 1000)}</time>
       </td>
-      <td>{`${words(command.kind)}${arguments_text(command.arguments)}`}</td>
+      <td>{`${words(command.kind)}${arguments_text(command.arguments)}${renewals_text(command)}`}</td>
       <td>{command.actor}</td>
       <td>{command.reason ? `${command.state}: ${sentence(command.reason)}` : command.state}</td>
       <td class="number">{milliseconds_of_us(command.sent_after_us)}</td>

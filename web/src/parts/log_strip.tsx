@@ -1,6 +1,7 @@
 // The last events and commands, newest first.
 
-import { clock_time, millimetres, percent, plus_minus, words } from '../format';
+import type { CommandRecord } from '../api';
+import { clock_time, count, millimetres, percent, plus_minus, words } from '../format';
 import { kWaysOut, sentence } from '../reasons';
 import type { Session } from '../session';
 import type { LogLine } from '../store';
@@ -42,7 +43,7 @@ export function describe({ event, command, note, position_sd_m }: LogLine): [ton
     return [
       refused ? 'caution' : alarm ? 'alarm' : '',
       'command',
-      `${words(command.kind)}${arguments_text(command.arguments)} · ${end}${off}`,
+      `${words(command.kind)}${arguments_text(command.arguments)}${renewals_text(command)} · ${end}${off}`,
     ];
   }
   if (event) {
@@ -65,7 +66,7 @@ export function describe({ event, command, note, position_sd_m }: LogLine): [ton
     const spread = position_sd_m === null ? unknown : ` ${plus_minus(position_sd_m)} mm`;
     const at = position && ` · controller at ${position}${spread}`;
     const way_out = kWaysOut[event.kind] ? ` · ${kWaysOut[event.kind]}` : '';
-    const caution = /lost|fault|limit|lapsed|uncertain|mismatch$/.test(event.kind);
+    const caution = /lost|left_out|fault|limit|lapsed|uncertain|mismatch$/.test(event.kind);
     return [
       alarm ? 'alarm' : caution ? 'caution' : '',
       'event',
@@ -73,6 +74,15 @@ export function describe({ event, command, note, position_sd_m }: LogLine): [ton
     ];
   }
   return ['quiet', 'page', note ?? ''];
+}
+
+// Of a renewal of a lease: those that followed and have no record of their own.
+export function renewals_text({ further_renewals, last_renewed_at_us, reason }: CommandRecord): string {
+  if (further_renewals === undefined || further_renewals === 0) return '';
+  if (further_renewals === null)
+    return reason === 'station_restarted' ? ' and an unknown number more' : ' and more, not counted yet';
+  const until = last_renewed_at_us ? ` until ${clock_time(last_renewed_at_us / 1000)}` : '';
+  return ` and ${count(further_renewals)} more${until}`;
 }
 
 export function arguments_text({ execute_at_robot_us: at_us, ...values }: Record<string, unknown>): string {

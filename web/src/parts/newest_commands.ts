@@ -24,7 +24,8 @@ export class NewestCommands {
     this.show();
   }
 
-  // Of any robot. Renewals of a lease are left out: there are ten a second while a motor runs.
+  // Of any robot. Renewals of a lease are left out: there are ten a second while a motor runs. The station lists them as
+  // one once they have ended.
   report = (command: CommandRecord): void => {
     if (command.robot_id !== this.robot_id || command.kind === 'renew_lease') return;
     this.reported.add(command.command_id);

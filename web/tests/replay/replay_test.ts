@@ -170,6 +170,27 @@ test('of a command it shows what had become of it by then', async () => {
   expect(line_at(of_refused!, at(300)).command).toMatchObject({ state: 'rejected', reason: 'latched' });
 });
 
+test('of renewals that were counted the number is shown from the last one on', () => {
+  const renewal = {
+    command_id: '5',
+    robot_id: 'rheo-1',
+    kind: 'renew_lease',
+    state: 'acknowledged',
+    reason: '',
+    submitted_at_us: at(200),
+    sent_after_us: 1000,
+    acknowledged_after_us: 2000,
+    verified_after_us: null,
+    ended_at_us: at(201),
+    further_renewals: 12,
+    last_renewed_at_us: at(400),
+  };
+  const [line] = lines_of([], [renewal as unknown as CommandRecord], [], kExtent);
+  expect(line_at(line!, at(200)).command).toMatchObject({ state: 'queued', further_renewals: 0 });
+  expect(line_at(line!, at(300)).command).toMatchObject({ state: 'acknowledged', further_renewals: null });
+  expect(line_at(line!, at(400)).command).toMatchObject({ state: 'acknowledged', further_renewals: 12 });
+});
+
 test('marks are moments of the run and beginnings of gaps', () => {
   const moment = (seq: number) => ({ key: `${seq}`, utc_us: at(seq), kind: 'marker' as const, text: 'light', by: '' });
   const marks = marks_of([moment(100), moment(-5), moment(9999)], [[3, 4.5]], kExtent);

@@ -32,6 +32,8 @@ const kRecording: Recording = {
   },
   retention: {
     retention_days: 0,
+    event_retention_days: 0,
+    events_purged: 0,
     max_database_bytes: 0,
     samples_purged: 0,
     bytes_returned: 0,

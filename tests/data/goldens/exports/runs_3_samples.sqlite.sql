@@ -295,22 +295,24 @@ CREATE TABLE command(
   sent_after_us INT,
   acknowledged_after_us INT,
   verified_after_us INT,
-  life_from TEXT
+  life_from TEXT,
+  further_renewals INT,
+  last_renewed_at_us INT
 );
-INSERT INTO command VALUES('9564308153959284907','r1','18364758544493064721','set_duty','{"duty":-0.9}','token:local','rejected','unknown_40',1795575967158000,1795575967158000,1795575967158000,6158000,'0',0,NULL,NULL,'arrival');
-INSERT INTO command VALUES('12178730177414951181','r1','18364758544493064721','set_mode','{"mode":"auto","setpoint_m":0.125}','token:local','verified','',1795575967158000,1795575967158000,1795575967158000,6158000,'0',0,0,0,'arrival');
-INSERT INTO command VALUES('13064396156225473817','r1','18364758544493064721','set_duty','{"duty":0.1}','token:local','rejected','busy',1795575967158000,1795575967158000,1795575967158000,6158000,'0',0,NULL,NULL,'arrival');
-INSERT INTO command VALUES('14109521515791744902','r1','18364758544493064721','set_duty','{"duty":0.2}','token:local','expired','expired',1795575967158000,1795575967158000,1795575967158000,6158000,'0',0,NULL,NULL,'arrival');
-INSERT INTO command VALUES('15571913878924461484','r1','18364758544493064721','ping','{}','token:local','acknowledged','duplicate',1795575967158000,1795575967158000,1795575967158000,6158000,'0',0,0,NULL,'arrival');
-INSERT INTO command VALUES('15781000307351985879','r1','18364758544493064721','ping','{}','token:local','rejected','other_boot',1795575967158000,1795575967158000,1795575967158000,6158000,'0',0,NULL,NULL,'arrival');
-INSERT INTO command VALUES('3775962213208117092','r1','18364758544493064721','ping','{}','token:local','acknowledged','',1795575967158000,1795575967158000,1795575967158000,6158000,'0',0,0,NULL,'arrival');
-INSERT INTO command VALUES('17146877070824583018','r1','18364758544493064721','set_setpoint','{"setpoint_m":0.2}','token:local','superseded','by_an_emergency',1795575967208000,1795575967208000,1795575970458000,6208000,'0',0,0,NULL,'arrival');
-INSERT INTO command VALUES('6073503041918755660','r1','18364758544493064721','set_setpoint','{"setpoint_m":0.25}','token:local','verified','',1795575967208000,1795575967208000,1795575967258000,6208000,'0',0,0,50000,'arrival');
-INSERT INTO command VALUES('10619068946664148859','r1','18364758544493064721','set_parameter','{"name":"duty_slew_per_s","value":0.1}','token:local','failed','read_back_differs',1795575967308000,1795575967308000,1795575967308000,6308000,'0',0,0,NULL,'arrival');
-INSERT INTO command VALUES('15959633193653531241','r1','18364758544493064721','set_setpoint','{"execute_at_robot_us":6808000,"setpoint_m":0.1}','token:local','superseded','by_an_emergency',1795575967308000,1795575967308000,1795575970458000,6308000,'0',0,0,NULL,'arrival');
-INSERT INTO command VALUES('7617890157137703680','r1','18364758544493064721','ping','{}','token:local','unknown','no_answer',1795575967308000,1795575967308000,1795575967458000,0,'0',0,NULL,NULL,'arrival');
-INSERT INTO command VALUES('4670970265874846992','r1','18364758544493064721','emergency_stop','{}','token:local','verified','',1795575970458000,1795575970458000,1795575970458000,9458000,'18446744073709551615',0,0,0,'');
-INSERT INTO command VALUES('11741057589345805078','r1','18364758544493064721','clear_emergency','{"emergency_id":"18446744073709551615"}','token:local','verified','',1795575970508000,1795575970508000,1795575970508000,9508000,'0',0,0,0,'arrival');
+INSERT INTO command VALUES('9564308153959284907','r1','18364758544493064721','set_duty','{"duty":-0.9}','token:local','rejected','unknown_40',1795575967158000,1795575967158000,1795575967158000,6158000,'0',0,NULL,NULL,'arrival',0,NULL);
+INSERT INTO command VALUES('12178730177414951181','r1','18364758544493064721','set_mode','{"mode":"auto","setpoint_m":0.125}','token:local','verified','',1795575967158000,1795575967158000,1795575967158000,6158000,'0',0,0,0,'arrival',0,NULL);
+INSERT INTO command VALUES('13064396156225473817','r1','18364758544493064721','set_duty','{"duty":0.1}','token:local','rejected','busy',1795575967158000,1795575967158000,1795575967158000,6158000,'0',0,NULL,NULL,'arrival',0,NULL);
+INSERT INTO command VALUES('14109521515791744902','r1','18364758544493064721','set_duty','{"duty":0.2}','token:local','expired','expired',1795575967158000,1795575967158000,1795575967158000,6158000,'0',0,NULL,NULL,'arrival',0,NULL);
+INSERT INTO command VALUES('15571913878924461484','r1','18364758544493064721','ping','{}','token:local','acknowledged','duplicate',1795575967158000,1795575967158000,1795575967158000,6158000,'0',0,0,NULL,'arrival',0,NULL);
+INSERT INTO command VALUES('15781000307351985879','r1','18364758544493064721','ping','{}','token:local','rejected','other_boot',1795575967158000,1795575967158000,1795575967158000,6158000,'0',0,NULL,NULL,'arrival',0,NULL);
+INSERT INTO command VALUES('3775962213208117092','r1','18364758544493064721','ping','{}','token:local','acknowledged','',1795575967158000,1795575967158000,1795575967158000,6158000,'0',0,0,NULL,'arrival',0,NULL);
+INSERT INTO command VALUES('17146877070824583018','r1','18364758544493064721','set_setpoint','{"setpoint_m":0.2}','token:local','superseded','by_an_emergency',1795575967208000,1795575967208000,1795575970458000,6208000,'0',0,0,NULL,'arrival',0,NULL);
+INSERT INTO command VALUES('6073503041918755660','r1','18364758544493064721','set_setpoint','{"setpoint_m":0.25}','token:local','verified','',1795575967208000,1795575967208000,1795575967258000,6208000,'0',0,0,50000,'arrival',0,NULL);
+INSERT INTO command VALUES('10619068946664148859','r1','18364758544493064721','set_parameter','{"name":"duty_slew_per_s","value":0.1}','token:local','failed','read_back_differs',1795575967308000,1795575967308000,1795575967308000,6308000,'0',0,0,NULL,'arrival',0,NULL);
+INSERT INTO command VALUES('15959633193653531241','r1','18364758544493064721','set_setpoint','{"execute_at_robot_us":6808000,"setpoint_m":0.1}','token:local','superseded','by_an_emergency',1795575967308000,1795575967308000,1795575970458000,6308000,'0',0,0,NULL,'arrival',0,NULL);
+INSERT INTO command VALUES('7617890157137703680','r1','18364758544493064721','ping','{}','token:local','unknown','no_answer',1795575967308000,1795575967308000,1795575967458000,0,'0',0,NULL,NULL,'arrival',0,NULL);
+INSERT INTO command VALUES('4670970265874846992','r1','18364758544493064721','emergency_stop','{}','token:local','verified','',1795575970458000,1795575970458000,1795575970458000,9458000,'18446744073709551615',0,0,0,'',0,NULL);
+INSERT INTO command VALUES('11741057589345805078','r1','18364758544493064721','clear_emergency','{"emergency_id":"18446744073709551615"}','token:local','verified','',1795575970508000,1795575970508000,1795575970508000,9508000,'0',0,0,0,'arrival',0,NULL);
 CREATE TABLE marker(
   run_id INT,
   span INT,
@@ -510,6 +512,8 @@ INSERT INTO about VALUES('command','sent_after_us','time from the request to the
 INSERT INTO about VALUES('command','acknowledged_after_us','time from the request to the robot''s answer; NULL: no answer');
 INSERT INTO about VALUES('command','verified_after_us','time from the request to telemetry that shows the effect; NULL: not seen');
 INSERT INTO about VALUES('command','life_from','from which time its validity counted: arrival, stamp or issued_at; empty: it does not expire');
+INSERT INTO about VALUES('command','further_renewals','of a renewal of a lease: those that the robot accepted right after it and that have no row; NULL: unknown, or they went on');
+INSERT INTO about VALUES('command','last_renewed_at_us','when the last of them was requested; NULL: there is none, or it is unknown');
 INSERT INTO about VALUES('audit','entry','number of the entry on its station, without holes');
 INSERT INTO about VALUES('audit','at_us','time of the action; this to salt are NULL where the entry is not of this run''s robot');
 INSERT INTO about VALUES('audit','actor','who did it');
@@ -678,6 +682,8 @@ INSERT INTO about VALUES('robot_command','sent_after_us','time from the request 
 INSERT INTO about VALUES('robot_command','acknowledged_after_us','time from the request to the robot''s answer; NULL: no answer');
 INSERT INTO about VALUES('robot_command','verified_after_us','time from the request to telemetry that shows the effect; NULL: not seen');
 INSERT INTO about VALUES('robot_command','life_from','from which time its validity counted: arrival, stamp or issued_at; empty: it does not expire');
+INSERT INTO about VALUES('robot_command','further_renewals','of a renewal of a lease: those that the robot accepted right after it and that have no row; NULL: unknown, or they went on');
+INSERT INTO about VALUES('robot_command','last_renewed_at_us','when the last of them was requested; NULL: there is none, or it is unknown');
 CREATE VIEW run_sample AS SELECT (SELECT run_id FROM run) AS run_id, span, boot_id, seq, robot_time_us, utc_us, clock_uncertainty_us, received_at_us, position_m, velocity_m_s, acceleration_m_s2, duty, impedance_mv, reference_m, mode, sub_state, setpoint_m, disturbance_m, position_sd_m, controller_id, emergency_id, emergency_cause, flags, first_received_at_us, flags & 1 AS backfilled, unknown_values FROM sample;
 CREATE VIEW run_gap AS SELECT run_id, span, boot_id, first_seq, last_seq, cause, noticed_at_us FROM run CROSS JOIN gap;
 CREATE VIEW robot_gap AS SELECT robot_id, boot_id, first_seq, last_seq, last_seq - first_seq + 1 AS samples, cause,

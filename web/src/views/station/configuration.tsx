@@ -31,6 +31,11 @@ export function Configuration({ context }: { context: Context }) {
             <Fact name="retention_days">
               {retention.retention_days === 0 ? '0, samples are kept for ever' : count(retention.retention_days)}
             </Fact>
+            <Fact name="event_retention_days">
+              {retention.event_retention_days === 0
+                ? '0, events are kept for ever'
+                : count(retention.event_retention_days)}
+            </Fact>
             <Fact name="max_database_mb">
               {retention.max_database_bytes === 0 ? '0, no limit' : bytes(retention.max_database_bytes)}
             </Fact>

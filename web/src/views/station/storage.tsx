@@ -54,8 +54,13 @@ export function Storage({ context }: { context: Context }) {
                   : 'for ever'
                 : `${count(retention.retention_days)} days`}
             </Fact>
+            <Fact name="Events are kept">
+              {retention.event_retention_days === 0 ? 'for ever' : `${count(retention.event_retention_days)} days`}
+            </Fact>
             <Fact name="Largest database">{is_bounded ? bytes(retention.max_database_bytes) : 'no limit'}</Fact>
-            <Fact name="Removed">{count(retention.samples_purged)} samples since the start</Fact>
+            <Fact name="Removed">
+              {count(retention.samples_purged)} samples and {count(retention.events_purged)} events since the start
+            </Fact>
             <Fact name="Given back">{bytes(retention.bytes_returned)} to the file system</Fact>
             <Fact name="Longest step">{retention.longest_step_ms.toFixed(1)} ms between two commits</Fact>
             {retention.all_held && (
@@ -67,9 +72,9 @@ export function Storage({ context }: { context: Context }) {
             )}
           </dl>
           <p class="station-note">
-            Samples of runs are kept until the run is discarded; events, commands and the audit always. To change it,
-            set <code>recording.retention_days</code> or <code>recording.max_database_mb</code> in the configuration
-            file and restart the station.
+            Samples and events of runs are kept until the run is discarded; commands and the audit always. To change it,
+            set <code>recording.retention_days</code>, <code>recording.event_retention_days</code> or{' '}
+            <code>recording.max_database_mb</code> in the configuration file and restart the station.
           </p>
         </Panel>
         <Panel id="station-writing" title="Writing">

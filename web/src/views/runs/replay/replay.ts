@@ -187,7 +187,10 @@ export class Replay {
 }
 
 const is_same = (a: LogLine, b: LogLine | undefined) =>
-  a.key === b?.key && a.at_ms === b.at_ms && a.command?.state === b.command?.state;
+  a.key === b?.key &&
+  a.at_ms === b.at_ms &&
+  a.command?.state === b.command?.state &&
+  a.command?.further_renewals === b.command?.further_renewals;
 
 // A command as it stood at a moment: what became of it later is not known then.
 export function line_at(line: LogLine, utc_us: number): LogLine {
@@ -196,7 +199,9 @@ export function line_at(line: LogLine, utc_us: number): LogLine {
   const { submitted_at_us, ended_at_us, sent_after_us, acknowledged_after_us, verified_after_us } = command;
   const is_later = (after_us: number | null) => after_us !== null && submitted_at_us + after_us > utc_us;
   const stages = { sent_after_us, acknowledged_after_us, verified_after_us };
-  if (!Object.values(stages).some(is_later) && (ended_at_us ?? 0) <= utc_us) return line;
+  const goes_on = (command.last_renewed_at_us ?? 0) > utc_us; // renewals that are counted from here
+  if (!Object.values(stages).some(is_later) && (ended_at_us ?? 0) <= utc_us)
+    return goes_on ? { ...line, command: { ...command, further_renewals: null, last_renewed_at_us: null } } : line;
   const reached = (after_us: number | null) => (is_later(after_us) ? null : after_us);
   const then = {
     sent_after_us: reached(sent_after_us),
@@ -211,7 +216,8 @@ export function line_at(line: LogLine, utc_us: number): LogLine {
         : then.sent_after_us !== null
           ? 'sent'
           : 'queued';
-  return { ...line, command: { ...command, ...then, state, reason: '' } };
+  const uncounted = goes_on ? { further_renewals: 0, last_renewed_at_us: null } : {};
+  return { ...line, command: { ...command, ...then, ...uncounted, state, reason: '' } };
 }
 
 // Events at their time on the robot's clock where it is known, commands when they were submitted.
