@@ -62,6 +62,7 @@ asio::awaitable<void> Recorder::run() {
     if (!queue_->has_commit()) build_commit();  // or the same content, until it is stored
     co_await write();
     boots_->forget_unused(clock_.steady_us());
+    report_returned();
     if (failing()) continue;
     flushes_.on_durable(queue_->position());
     co_await finish_checkpoint();
@@ -227,6 +228,7 @@ void Recorder::start(BootEntry& boot) {
     watch(*replaced);
   }
   queue_->enqueue_start(boot, std::move(started.start));
+  note_returned(boot);
 }
 
 void Recorder::on_samples(const station::RobotState&, const station::SampleBatch& batch) {
@@ -236,7 +238,7 @@ void Recorder::on_samples(const station::RobotState&, const station::SampleBatch
     return;
   }
   const std::size_t added = boot->recording.count_new(batch);
-  counters_.samples_duplicate += batch.samples.size() - added;
+  counters_.samples_duplicate += batch.samples.size() - added - boot->recording.count_given_up(batch);
   if (queue_->has_room_for_samples(added)) {
     boot->recording.append(batch, clock_.steady_us());
     queue_->count_received(added);
@@ -255,21 +257,6 @@ void Recorder::note_refused(std::size_t samples) {
   overflow_logged_us_ = now_us;
   spdlog::warn("the disk does not keep up: {} samples wait, {} were refused so far and will be asked for again",
                queue_->samples(), counters_.samples_refused);
-}
-
-void Recorder::on_unusable_samples(const station::RobotState& robot, std::uint64_t first_seq, std::uint64_t next_seq) {
-  ++counters_.batches_malformed;
-  BootEntry* boot = boots_->find_recorded(robot.boot_id);
-  if (boot == nullptr) return;
-  boot->recording.set_lost({first_seq, next_seq}, "invalid", robot.last_received_at_us);
-  watch(*boot);
-}
-
-void Recorder::on_unusable_event(const station::RobotState& robot, std::uint64_t event_seq) {
-  BootEntry* boot = boots_->find_recorded(robot.boot_id);
-  if (boot == nullptr) return;
-  boot->recording.set_event_lost(event_seq, "invalid", robot.last_received_at_us);
-  watch(*boot);
 }
 
 // SAFETY: whatever waits, since its limits must hold after a restart. One entry for each robot at most.
