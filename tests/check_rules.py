@@ -34,7 +34,7 @@ sim_robot/client sim_robot/fleet sim_robot/proxy sim_robot/cli
 server/runtime server/config server/tls server/net
 server/station/state server/station/commands server/station server/station/models server/link server/live server/live/foxglove
 server/storage/database server/storage/audit server/storage/samples server/storage/commits server/storage/ingest server/storage/groups
-server/storage/runs server/storage/jobs server/storage/designs server/storage/experiments server/storage/reservations
+server/storage/runs server/storage/finalizing server/storage/jobs server/storage/designs server/storage/experiments server/storage/reservations
 server/storage/query server/storage/export server/storage/export/mat server/storage/export/mcap server/storage/upkeep server/storage
 server/analysis/metrics server/analysis/comparison server/analysis/report server/analysis/capsule server/analysis server/analysis/tuning
 server/analysis/documents server/experiments server/experiments/adaptive server/experiments/runner server/identity server/http

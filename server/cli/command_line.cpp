@@ -16,6 +16,7 @@
 #include "base/version.hpp"
 #include "server/cli/terminal/exit_status.hpp"
 #include "server/cli/terminal/options.hpp"
+#include "server/runtime/log.hpp"
 
 namespace server::cli {
 namespace {
@@ -216,6 +217,9 @@ std::optional<int> answer(const CommandLine& line, std::ostream& out) {
       line);
 }
 
-std::optional<int> answer(const CommandLine& line) { return answer(line, std::cout); }
+std::optional<int> answer(const CommandLine& line) {
+  if (!std::holds_alternative<Serve>(line)) runtime::start_log("info");  // on standard error; the other has the answer
+  return answer(line, std::cout);
+}
 
 }  // namespace server::cli

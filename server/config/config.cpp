@@ -207,6 +207,7 @@ void read(ConfigFile& file, Config& config) {
   RecordingConfig& recording = config.recording;
   file.take_count("recording", "retention_days", {0, 36'500}, recording.retention_days);
   file.take_count("recording", "event_retention_days", {0, 36'500}, recording.event_retention_days);
+  file.take_count("recording", "give_up_after_days", {0, 36'500}, recording.give_up_after_days);
   file.take_count("recording", "max_database_mb", {0, 100'000'000}, recording.max_database_mb);
   file.take_count("recording", "low_space_mb", {0, 100'000'000}, recording.low_space_mb);
   file.take_count("recording", "critical_space_mb", {0, 100'000'000}, recording.critical_space_mb);

@@ -24,6 +24,8 @@ struct RecordingConfig {
   std::uint32_t low_space_mb = 2048;       // recording.low_space_mb: with less free space people are warned
   std::uint32_t critical_space_mb = 512;   // recording.critical_space_mb: ... nothing new is begun
   std::filesystem::path backup_dir;        // recording.backup_dir; empty: "backups" in the data folder
+  // recording.give_up_after_days: after which a run is final whose robot is away with samples of it; 0: never
+  std::uint32_t give_up_after_days = 0;
 };
 
 // Section [tls]. Beyond this machine's loopback, bytes travel in TLS or, where somebody said so, in plain sight.

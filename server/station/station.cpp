@@ -167,4 +167,13 @@ void Station::request_event_resend(const RobotId& id, BootId boot_id) {
   if (entry != nullptr && entry->link != nullptr) entry->link->request_event_resend();
 }
 
+void Station::note_returned(const RobotId& id, BootId boot_id, std::uint64_t first_seq, std::uint64_t last_seq,
+                            std::uint64_t samples) {
+  const RobotEntry* entry = parts_->robots.find(id, boot_id);
+  if (entry == nullptr) return;
+  parts_->notifier.note(entry->robot, "given_up_samples_returned",
+                        fmt::format("{} samples between {} and {} of boot {}, which are not recorded", samples,
+                                    first_seq, last_seq, boot_id));
+}
+
 }  // namespace server::station

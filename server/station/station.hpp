@@ -167,6 +167,9 @@ class Station {
                   std::uint64_t durable_next_event_seq);
   void request_resend(const RobotId& id, BootId boot_id, std::uint64_t first_seq, std::uint64_t next_seq);
   void request_event_resend(const RobotId& id, BootId boot_id);
+  // The boot came back with so many samples in this range that were given up.
+  void note_returned(const RobotId& id, BootId boot_id, std::uint64_t first_seq, std::uint64_t last_seq,
+                     std::uint64_t samples);
 
  private:
   std::unique_ptr<StationParts> parts_;

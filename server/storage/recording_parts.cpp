@@ -28,6 +28,7 @@ RecordingParts::RecordingParts(asio::io_context& loop, runtime::Clock& clock, ru
       head_watch{clock, recorder, checkpoints, options.head_interval},
       reader{options.path, readers},
       digester{clock, recorder, reader},
+      finalizer{clock, recorder, reader, digester, config.give_up_after_days},
       runs{clock, recorder, reader, digester},
       markers{clock, recorder, reader},
       references{clock, recorder, reader},
@@ -53,6 +54,10 @@ void RecordingParts::connect(station::Station& station) {
   recorder.set_on_durable(std::bind_front(&station::Station::on_durable, &station));
   recorder.set_on_missing(std::bind_front(&station::Station::request_resend, &station));
   recorder.set_on_missing_events(std::bind_front(&station::Station::request_event_resend, &station));
+  recorder.set_on_returned([&station](const ReturnedSamples& returned) {
+    station.note_returned(returned.robot_id, returned.boot_id, returned.range.first, returned.range.next - 1,
+                          returned.samples);
+  });
 }
 
 asio::awaitable<RestoredState> RecordingParts::open() {
@@ -77,6 +82,7 @@ void RecordingParts::spawn(runtime::TaskGroup& tasks) {
   tasks.spawn("checkpoints", recorder.run_checkpoints());
   tasks.spawn("head of the database", head_watch.run());
   tasks.spawn("digester", digester.run());
+  tasks.spawn("finalizer", finalizer.run());
   tasks.spawn("interrupted runs", runs.finish_loading());
   tasks.spawn("disk watch", disk_watch.run());
   tasks.spawn("jobs", jobs.run());

@@ -14,6 +14,7 @@
 #include "server/storage/database/database_reader.hpp"
 #include "server/storage/designs/designs.hpp"
 #include "server/storage/export/export_slots.hpp"
+#include "server/storage/finalizing/run_finalizer.hpp"
 #include "server/storage/groups/group_maker.hpp"
 #include "server/storage/ingest/recorder.hpp"
 #include "server/storage/jobs/job_files.hpp"
@@ -60,6 +61,7 @@ struct RecordingParts {
   HeadWatch head_watch;
   DatabaseReader reader;
   RunDigester digester;
+  RunFinalizer finalizer;
   Runs runs;
   Markers markers;
   OutsideReferences references;

@@ -73,6 +73,7 @@ TEST_F(ConfigTest, TheDocumentedFileHoldsEveryDefault) {
   EXPECT_EQ(from_file.envelope.of_fluid(), defaults.envelope.of_fluid());
   EXPECT_EQ(from_file.recording.retention_days, defaults.recording.retention_days);
   EXPECT_EQ(from_file.recording.event_retention_days, defaults.recording.event_retention_days);
+  EXPECT_EQ(from_file.recording.give_up_after_days, defaults.recording.give_up_after_days);
   EXPECT_EQ(from_file.recording.max_database_mb, defaults.recording.max_database_mb);
   EXPECT_EQ(from_file.recording.low_space_mb, defaults.recording.low_space_mb);
   EXPECT_EQ(from_file.recording.critical_space_mb, defaults.recording.critical_space_mb);
@@ -123,6 +124,10 @@ TEST_F(ConfigTest, MistakesNameFileLineOptionAndRemedy) {
   EXPECT_THAT(mistake("[recording]\nretention_days = -1\n"), HasSubstr("retention_days = -1 is outside 0 to 36500"));
   EXPECT_THAT(mistake("[recording]\nevent_retention_days = 36501\n"),
               HasSubstr("event_retention_days = 36501 is outside 0 to 36500"));
+  EXPECT_THAT(mistake("[recording]\ngive_up_after_days = 0.5\n"),
+              HasSubstr("recording.give_up_after_days must be a whole number"));
+  EXPECT_THAT(mistake("[recording]\ngive_up_after_days = -1\n"),
+              HasSubstr("give_up_after_days = -1 is outside 0 to 36"));
   EXPECT_THAT(mistake("[recording]\ncritical_space_mb = 3000\n"), HasSubstr("must be at most recording.low_space_mb"));
   EXPECT_THAT(mistake("[http]\nlisten = \"here\"\n"), HasSubstr("'here' is not ADDR:PORT"));
   EXPECT_THAT(mistake("[http]\nmax_connections = 15\n"), HasSubstr("http.max_connections = 15 is outside 16 to 32768"));

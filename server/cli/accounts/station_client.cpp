@@ -3,23 +3,25 @@
 
 #include <fmt/format.h>
 
-#include <fstream>
+#include <optional>
 #include <stdexcept>
 
 #include "server/config/endpoint.hpp"
+#include "server/runtime/private_file.hpp"
 
 namespace server::cli {
 namespace asio = boost::asio;
 
 namespace {
 
+// SAFETY: from a file that another user of the machine wrote, the token would go to a program of theirs.
 nlohmann::json announcement_in(const std::filesystem::path& file) {
-  if (!std::filesystem::exists(file)) {
+  const std::optional<std::string> text = runtime::read_private(file);
+  if (!text) {
     throw std::runtime_error{
         fmt::format("no station runs in '{0}': rheonaut serve --data '{0}' starts one", file.parent_path().string())};
   }
-  std::ifstream in{file};
-  auto content = nlohmann::json::parse(in, nullptr, false);
+  auto content = nlohmann::json::parse(*text, nullptr, false);
   if (!content.is_object() || !content.contains("http")) {
     throw std::runtime_error{
         fmt::format("'{}' does not say where the station is: it is starting or stopping; try again", file.string())};
@@ -39,12 +41,10 @@ std::string token_of(const std::filesystem::path& file) {
     throw std::runtime_error{
         fmt::format("there is no folder '{}'; --data names that of a station", file.parent_path().string())};
   }
-  std::ifstream in{file};
-  std::string token;
-  if (!std::getline(in, token) || token.empty()) {
-    throw std::runtime_error{fmt::format("cannot read the station's token in '{}'", file.string())};
-  }
-  return token;
+  const std::string token = runtime::read_private(file).value_or("");
+  const std::string line = token.substr(0, token.find('\n'));
+  if (line.empty()) throw std::runtime_error{fmt::format("cannot read the station's token in '{}'", file.string())};
+  return line;
 }
 
 }  // namespace

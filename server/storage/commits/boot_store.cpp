@@ -267,6 +267,12 @@ void BootStore::add(const std::vector<NewBoot>& boots) {
   execute(advance, boots.back().boot_key + 1);
 }
 
+StoredBoot BootStore::find(const station::RobotId& robot_id, station::BootId boot_id) {
+  SQLite::Statement known{database_.handle(), "SELECT boot_key FROM boot WHERE boot_id = ? AND robot_id = ?"};
+  bind_all(known, boot_id, robot_id);
+  return known.executeStep() ? load(known.getColumn(0).getInt64()) : StoredBoot{};
+}
+
 // Of a boot of an older program, where it is not stored how far it is recorded, all segments and gaps are read.
 StoredBoot BootStore::load(std::int64_t boot_key) {
   StoredBoot boot;
@@ -290,6 +296,11 @@ StoredBoot BootStore::load(std::int64_t boot_key) {
   add_intervals(handle,
                 "SELECT first_event_seq, last_event_seq FROM event_gap WHERE boot_key = ? AND first_event_seq >= ?",
                 boot_key, next_event_seq, boot.events);
+  SQLite::Statement given_up{handle, "SELECT first_seq, last_seq FROM gap WHERE boot_key = ? AND cause = ?"};
+  bind_all(given_up, boot_key, std::string{kGivenUp});
+  while (given_up.executeStep()) {
+    boot.given_up.insert({unsigned_id(given_up.getColumn(0)), unsigned_id(given_up.getColumn(1)) + 1});
+  }
   boot.next_seq = std::max(unsigned_id(query.getColumn(0)), boot.samples.end());
   boot.next_event_seq = std::max(unsigned_id(query.getColumn(5)), boot.events.end());
   boot.last_robot_time_us = unsigned_id(query.getColumn(1));

@@ -18,13 +18,17 @@ namespace server::storage {
 // A boot as it is stored.
 struct StoredBoot {
   std::int64_t key = 0;
-  IntervalSet samples;  // stored or known lost
+  IntervalSet samples;   // stored or known lost
+  IntervalSet given_up;  // of those
   IntervalSet events;
   std::uint64_t next_seq = 0;        // every sample below was made
   std::uint64_t next_event_seq = 0;  // every event below was made
   std::uint64_t last_robot_time_us = 0;
   std::int64_t connected_at_us = 0;  // UTC, the latest time; 0: never
 };
+
+// Samples that nobody expects any more are gaps of this cause: their robot did not come back with them.
+inline constexpr const char* kGivenUp = "given_up";
 
 // A robot asks to be let in. `owner` is the robot that the recorder knows the boot of; without one the boot is looked
 // for, and what is stored of it is read.
@@ -85,6 +89,9 @@ class BootStore {
   // is refused as STATION_BUSY. One outcome for each question, in order.
   std::vector<AdmissionOutcome> admit(const std::vector<AdmissionQuestion>& questions,
                                       const config::LoopbackEnrolment& enrolment);
+
+  // The boot as it is stored; key 0: it is not this robot's.
+  StoredBoot find(const station::RobotId& robot_id, station::BootId boot_id);
 
   // Inside the caller's transaction: these boots are known from now on.
   void add(const std::vector<NewBoot>& boots);

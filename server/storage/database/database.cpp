@@ -55,6 +55,12 @@ void keep_log(SQLite::Database& database, bool keep) {
 }
 
 SQLite::Database open_checked(const std::filesystem::path& path) {
+  if (is_symlink(path)) {  // SAFETY: it could lead to a file of somebody else
+    throw std::runtime_error{
+        fmt::format("'{}' is a link, and the database is not written through one: move the file that it leads to here, "
+                    "with its -wal, or name the folder of that file with --data",
+                    path.string())};
+  }
   if (const auto problem = file_problem(path)) refuse(path, *problem);
   if (const auto kept = set_aside_orphaned_log(path)) {
     spdlog::error("{} is gone, and its write-ahead log is there: the log is kept as {}", path.string(), kept->string());

@@ -68,6 +68,7 @@ void add_lost(std::vector<LostRange>& gaps, const LostRange& range, const Interv
 void BootRecording::load(StoredBoot stored) {
   key_ = stored.key;
   committed_ = received_ = std::move(stored.samples);
+  given_up_ = std::move(stored.given_up);
   received_events_ = std::move(stored.events);
   durable_next_seq_ = received_.first_hole();
   durable_next_event_seq_ = received_events_.first_hole();
@@ -95,6 +96,10 @@ void BootRecording::connect(const station::AdmissionRequest& hello, std::int64_t
   set_events_lost_below(std::min(hello.acknowledged_next_event_seq, hello.oldest_event_seq), acknowledged_cause,
                         hello.received_at_us);
   set_events_lost_below(hello.oldest_event_seq, cause, hello.received_at_us);
+  returned_.clear();
+  for (const Interval& held : given_up_.covered({hello.oldest_seq, hello.next_seq})) {
+    std::ranges::copy(ever_returned_.insert(held), std::back_inserter(returned_));
+  }
   sample_hole_.reset();  // the robot now sends by itself what it holds
   event_hole_.reset();
 }
@@ -186,6 +191,17 @@ void BootRecording::set_lost(Interval samples, const char* cause, std::int64_t u
   next_seq_ = std::max(next_seq_, samples.next);
 }
 
+void BootRecording::give_up(Interval samples, std::int64_t utc_us) {
+  for (const Interval& lost : received_.insert(made(samples))) {
+    add_gap(waiting_gaps_, {key_, lost, kGivenUp, utc_us});
+    given_up_.insert(lost);
+  }
+}
+
+std::uint64_t BootRecording::count_given_up(const station::SampleBatch& batch) const {
+  return count(given_up_.covered({batch.first_seq, batch.next_seq()}));
+}
+
 void BootRecording::set_event_lost(std::uint64_t event_seq, const char* cause, std::int64_t utc_us) {
   for (const Interval& lost : received_events_.insert({event_seq, event_seq + 1})) {
     add_gap(waiting_event_gaps_, {key_, lost, cause, utc_us});
@@ -259,7 +275,10 @@ bool HoleWatch::is_overdue(std::uint64_t first_missing, std::int64_t steady_us) 
 std::optional<Interval> BootRecording::overdue_samples(std::int64_t steady_us) {
   const std::uint64_t first = received_.first_hole();
   if (!misses_samples() || !sample_hole_.is_overdue(first, steady_us)) return std::nullopt;
-  return Interval{first, received_.missing({first, next_seq_}).back().next};  // every hole; what comes twice is dropped
+  // Every hole up to what was given up, which is not asked for; what comes twice is dropped.
+  const std::vector<Interval> given_up = given_up_.covered({first, next_seq_});
+  const std::uint64_t end = given_up.empty() ? next_seq_ : given_up.front().first;
+  return Interval{first, received_.missing({first, end}).back().next};
 }
 
 bool BootRecording::has_overdue_events(std::int64_t steady_us) {

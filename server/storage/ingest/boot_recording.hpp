@@ -10,6 +10,7 @@
 // robots that connect together have complete segments at different times, a tenth of them each 100 ms at 100 Hz.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <optional>
 #include <vector>
@@ -57,6 +58,15 @@ class BootRecording {
   // These came and cannot be recorded.
   void set_lost(Interval samples, const char* cause, std::int64_t utc_us);
   void set_event_lost(std::uint64_t event_seq, const char* cause, std::int64_t utc_us);
+  // Of these samples, those that were made and are not here. To give them up makes them lost: those that come all the
+  // same are dropped.
+  std::vector<Interval> missing(Interval samples) const { return received_.missing(made(samples)); }
+  void give_up(Interval samples, std::int64_t utc_us);
+  // Of the batch's samples, those that were given up.
+  std::uint64_t count_given_up(const station::SampleBatch& batch) const;
+  // Samples that were given up and that the robot still held when it connected last, unless it did so before;
+  // ascending.
+  const std::vector<Interval>& returned() const { return returned_; }
   // False for an event that is here already.
   bool append_event(std::uint64_t event_seq);
   // There is no room: the event stays missing and is asked for again.
@@ -100,6 +110,7 @@ class BootRecording {
   std::uint64_t durable_next_event_seq() const { return durable_next_event_seq_; }
 
  private:
+  Interval made(Interval samples) const { return {samples.first, std::min(samples.next, next_seq_)}; }
   bool misses_samples() const { return received_.first_hole() < next_seq_; }
   bool misses_events() const { return received_events_.first_hole() < next_event_seq_; }
   std::uint64_t room_from(std::uint64_t seq) const;
@@ -120,6 +131,9 @@ class BootRecording {
   IntervalSet received_;
   IntervalSet committed_;
   IntervalSet refused_;
+  IntervalSet given_up_;       // part of received_
+  IntervalSet ever_returned_;  // part of given_up_
+  std::vector<Interval> returned_;
   IntervalSet received_events_;
   IntervalSet refused_events_;
 

@@ -65,7 +65,7 @@ station::Admission BootRegistry::admit(BootEntry& boot, StoredBoot stored, stati
                                        const station::AdmissionRequest& request, std::int64_t now_us) {
   if (boot.replaced) return another_boot_connected();
   if (!boot.recording.loaded()) {
-    load(boot, std::move(stored), request);
+    load_or_number(boot, std::move(stored), request);
   } else if (boot.recording.robot_id() != request.robot_id) {  // which was admitted meanwhile
     return reused(request, boot.recording.robot_id());
   }
@@ -83,15 +83,19 @@ station::Admission BootRegistry::admit(BootEntry& boot, StoredBoot stored, stati
 }
 
 // One that the disk does not know is numbered here and stored with the next commit.
-void BootRegistry::load(BootEntry& boot, StoredBoot stored, const station::AdmissionRequest& request) {
+void BootRegistry::load_or_number(BootEntry& boot, StoredBoot stored, const station::AdmissionRequest& request) {
   if (stored.key == 0) {
     stored.key = next_boot_key_++;
     stored.next_seq = request.next_seq;
     stored.last_robot_time_us = request.robot_time_us;
     with_records_.add(boot);
   }
-  by_robot_.emplace(request.robot_id, &boot);
-  boot.recording = BootRecording{request.robot_id};
+  load(boot, std::move(stored), request.robot_id);
+}
+
+void BootRegistry::load(BootEntry& boot, StoredBoot stored, const station::RobotId& robot_id) {
+  by_robot_.emplace(robot_id, &boot);
+  boot.recording = BootRecording{robot_id};
   boot.recording.load(std::move(stored));
 }
 

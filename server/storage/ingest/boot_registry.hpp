@@ -57,6 +57,9 @@ class BootRegistry {
   station::Admission admit(BootEntry& boot, StoredBoot stored, station::Admission answer,
                            const station::AdmissionRequest& request, std::int64_t now_us);
 
+  // What is stored of it is known here from now on; the boot has not connected since.
+  void load(BootEntry& boot, StoredBoot stored, const station::RobotId& robot_id);
+
   // A refused boot leaves nothing behind: the next forget_unused() looks for it.
   void forget_soon() { forget_at_once_ = true; }
 
@@ -81,7 +84,7 @@ class BootRegistry {
   void forget_unused(std::int64_t now_us);
 
  private:
-  void load(BootEntry& boot, StoredBoot stored, const station::AdmissionRequest& request);
+  void load_or_number(BootEntry& boot, StoredBoot stored, const station::AdmissionRequest& request);
   std::vector<BootEntry*> replace_others(const BootEntry& boot, std::int64_t utc_us);
   void replace(BootEntry& boot, std::int64_t utc_us);
   void forget(const BootEntry& boot);

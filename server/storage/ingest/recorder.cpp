@@ -60,6 +60,7 @@ asio::awaitable<void> Recorder::run() {
     if (!queue_->has_commit()) build_commit();  // or the same content, until it is stored
     co_await write();
     boots_->forget_unused(clock_.steady_us());
+    report_returned();
     if (failing()) continue;
     flushes_.on_durable(queue_->position());
     co_await finish_checkpoint();

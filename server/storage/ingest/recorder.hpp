@@ -68,6 +68,8 @@ struct RecorderCounters {
   std::uint64_t samples_duplicate = 0;
   std::uint64_t samples_refused = 0;     // not queued because the queue was full; each is asked for again
   std::uint64_t samples_lost = 0;        // in stored gaps
+  std::uint64_t samples_given_up = 0;    // of those: their robot did not come back
+  std::uint64_t samples_returned = 0;    // that were given up, and that their robot held when it came back all the same
   std::uint64_t records_refused = 0;     // events and commands that the full queue did not take
   std::uint64_t events_asked_again = 0;  // requests
   std::uint64_t batches_malformed = 0;
@@ -80,11 +82,34 @@ struct RecorderCounters {
   void count_written(const WriteBatch& written) {
     std::uint64_t samples = 0;
     for (const Segment& segment : written.segments) samples += segment.samples.size();
-    for (const LostRange& gap : written.gaps) samples_lost += gap.lost.next - gap.lost.first;
+    for (const LostRange& gap : written.gaps) {
+      samples_lost += gap.lost.next - gap.lost.first;
+      if (gap.cause == kGivenUp) samples_given_up += gap.lost.next - gap.lost.first;
+    }
     ++commits;
     samples_written += samples;
     largest_commit_samples = samples > largest_commit_samples ? samples : largest_commit_samples;
   }
+};
+
+// Samples that nobody is to expect any more: those that are missing of these.
+struct GiveUpOrder {
+  struct Part {
+    station::BootId boot_id = 0;
+    Interval samples;
+  };
+  station::RobotId robot_id;
+  std::vector<Part> parts;
+  std::optional<std::uint64_t> samples;  // so many are missing, if they are to be given up
+  station::AuditNote note;               // its detail gets how many they are, and the range of each boot
+};
+
+// A boot that came back with samples that were given up.
+struct ReturnedSamples {
+  station::RobotId robot_id;
+  station::BootId boot_id = 0;
+  Interval range;             // from the first of them to the last
+  std::uint64_t samples = 0;  // how many they are
 };
 
 class Recorder final : public station::StationSink, public station::RobotArchive {
@@ -96,6 +121,7 @@ class Recorder final : public station::StationSink, public station::RobotArchive
   using OnMissing =
       std::function<void(const station::RobotId&, station::BootId, std::uint64_t first_seq, std::uint64_t next_seq)>;
   using OnMissingEvents = std::function<void(const station::RobotId&, station::BootId)>;
+  using OnReturned = std::function<void(const ReturnedSamples&)>;
 
   Recorder(boost::asio::io_context& loop, runtime::Clock& clock, runtime::WorkerThread& disk,
            runtime::WorkerThread& checkpoints, RecorderOptions options);
@@ -104,6 +130,7 @@ class Recorder final : public station::StationSink, public station::RobotArchive
   void set_on_durable(OnDurable on_durable) { on_durable_ = std::move(on_durable); }
   void set_on_missing(OnMissing on_missing) { on_missing_ = std::move(on_missing); }
   void set_on_missing_events(OnMissingEvents on_missing) { on_missing_events_ = std::move(on_missing); }
+  void set_on_returned(OnReturned on_returned) { on_returned_ = std::move(on_returned); }
 
   // Opens or creates the database; before everything else. Throws when the file is not ours or cannot be written.
   boost::asio::awaitable<RestoredState> open();
@@ -132,6 +159,12 @@ class Recorder final : public station::StationSink, public station::RobotArchive
 
   // A robot whose enrolment was revoked is refused from this call on, also one that is being admitted.
   void set_revoked(const station::RobotId& robot_id, bool revoked) { admission_.set_revoked(robot_id, revoked); }
+
+  // What is missing of these samples is lost from now on, with the cause kGivenUp: one commit has the gaps and the
+  // note. Returns how many those are; none leaves no note. What comes of them later is dropped. conflict when such a
+  // boot is connected, since its robot sends them, and when another number is missing; unavailable when it is not
+  // durable within 3 s.
+  boost::asio::awaitable<Result<std::uint64_t>> give_up(GiveUpOrder order);
 
   void on_robot(const station::RobotState& robot) override;
   void on_fluid(const station::RobotState& robot) override;
@@ -194,6 +227,9 @@ class Recorder final : public station::StationSink, public station::RobotArchive
   boost::asio::awaitable<void> report_durable(std::vector<BootProgress> progress);
   boost::asio::awaitable<void> finish_checkpoint();
   boost::asio::awaitable<void> ask_for_missing();
+  boost::asio::awaitable<bool> load(BootEntry& boot, station::RobotId robot_id);
+  void note_returned(const BootEntry& boot);
+  void report_returned();
   boost::asio::awaitable<bool> flush_until(std::uint64_t position);
   std::string write_rest();
   void wake();
@@ -204,6 +240,7 @@ class Recorder final : public station::StationSink, public station::RobotArchive
   OnDurable on_durable_;
   OnMissing on_missing_;
   OnMissingEvents on_missing_events_;
+  OnReturned on_returned_;
 
   Checkpointer checkpointer_;
   DatabaseWorker database_;
@@ -216,10 +253,11 @@ class Recorder final : public station::StationSink, public station::RobotArchive
   WriteFailure failure_;
 
   RecorderCounters counters_;
-  std::int64_t last_commit_us_ = 0;      // steady
-  std::int64_t overflow_logged_us_ = 0;  // steady
-  bool idle_ = false;                    // run() waits for work_
-  runtime::Signal work_{loop_};          // something to record, or a robot to watch
+  std::vector<ReturnedSamples> returned_;  // not reported yet
+  std::int64_t last_commit_us_ = 0;        // steady
+  std::int64_t overflow_logged_us_ = 0;    // steady
+  bool idle_ = false;                      // run() waits for work_
+  runtime::Signal work_{loop_};            // something to record, or a robot to watch
 };
 
 }  // namespace server::storage

@@ -30,6 +30,7 @@ void Recorder::start(BootEntry& boot) {
     watch(*replaced);
   }
   queue_->enqueue_start(boot, std::move(started.start));
+  note_returned(boot);
 }
 
 void Recorder::on_samples(const station::RobotState& robot, const station::SampleBatch& batch) {
@@ -39,7 +40,7 @@ void Recorder::on_samples(const station::RobotState& robot, const station::Sampl
     return;
   }
   const std::size_t added = boot->recording.count_new(batch);
-  counters_.samples_duplicate += batch.samples.size() - added;
+  counters_.samples_duplicate += batch.samples.size() - added - boot->recording.count_given_up(batch);
   if (queue_->has_room_for_samples(added)) {
     boot->recording.append(batch, robot.latest_robot_time_us, clock_.steady_us());
     queue_->count_received(added);

@@ -79,6 +79,7 @@ Result<std::optional<HeadFile>> load_head_file(const fs::path& database) {
   std::error_code status_error;
   if (fs::status(path, status_error).type() == fs::file_type::not_found) return std::nullopt;
   try {
+    if (is_symlink(path)) throw std::runtime_error{"it is a link, which could lead to a file of somebody else"};
     const std::uintmax_t size = fs::file_size(path);
     if (size > kMaxFileBytes) throw std::runtime_error{fmt::format("it has {} bytes", size)};
     std::ifstream in{path, std::ios::binary};

@@ -1,5 +1,6 @@
 // Tools whose station is silent, or falls silent in the middle of its answer: each wait ends, and says what to do.
 #include <gmock/gmock.h>
+#include <unistd.h>
 
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/read_until.hpp>
@@ -77,6 +78,30 @@ std::string error_of(const Act& act) {
 }
 
 using SilentStationTest = ToolTest;
+
+// The tool ends before it asks anybody.
+TEST_F(SilentStationTest, AFileThatOthersMayHaveWrittenIsNotTrusted) {
+  const SilentStation station{folder_ / "lab"};
+  for (const char* name : {"rheonaut.token", "endpoints.json"}) {
+    const std::filesystem::path file = folder_ / "lab" / name;
+    std::filesystem::permissions(file, std::filesystem::perms{0602});
+    EXPECT_THAT(ask("job list --data @lab").error, HasSubstr("all users may write to the file")) << name;
+    std::filesystem::permissions(file, std::filesystem::perms{0600});
+    std::filesystem::rename(file, folder_ / "elsewhere");
+    std::filesystem::create_symlink(folder_ / "elsewhere", file);
+    EXPECT_THAT(ask("job list --data @lab").error, HasSubstr("is a link")) << name;
+    std::filesystem::rename(folder_ / "elsewhere", file);
+  }
+}
+
+TEST_F(SilentStationTest, AFileOfAnotherUserIsNotTrusted) {
+  if (::geteuid() != 0) GTEST_SKIP() << "only root can give a file away";
+  const SilentStation station{folder_ / "lab"};
+  for (const char* name : {"endpoints.json", "rheonaut.token"}) {
+    ASSERT_EQ(::chown((folder_ / "lab" / name).c_str(), 4711, 0), 0);
+    EXPECT_THAT(ask("job list --data @lab").error, HasSubstr("belongs to 4711")) << name;
+  }
+}
 
 TEST_F(SilentStationTest, AQuestionWithoutAnAnswerEndsAndSaysWhichStationHowLongAndWhatToDo) {
   const SilentStation station{folder_ / "data"};

@@ -81,6 +81,14 @@ TEST_F(DatabaseTest, RefusesWhatIsNotADatabaseAndLeavesIt) {
   EXPECT_EQ(content(), before);
 }
 
+TEST_F(DatabaseTest, IsNotWrittenThroughALink) {
+  const std::filesystem::path elsewhere = folder_ / "elsewhere.sqlite";
+  std::filesystem::create_symlink(elsewhere, path_);
+  EXPECT_THAT(refusal(), HasSubstr("is a link"));
+  EXPECT_THAT(refusal(), HasSubstr("--data"));
+  EXPECT_FALSE(exists(elsewhere));
+}
+
 TEST_F(DatabaseTest, RefusesTheDatabaseOfAnotherProgramAndLeavesIt) {
   make("PRAGMA application_id = 4711; CREATE TABLE theirs (x); INSERT INTO theirs VALUES (1);");
   const std::string before = content();

@@ -38,7 +38,8 @@ class DiskWatchTest : public RecordingTest {
                .max_database_mb = 0,
                .low_space_mb = 2000,
                .critical_space_mb = 500,
-               .backup_dir = {}});
+               .backup_dir = {},
+               .give_up_after_days = 0});
   }
   // From now on the disk has so much room, and the watch has looked.
   void set_free(std::uint64_t megabytes) {

@@ -21,7 +21,8 @@ class RetentionTest : public RecordingTest {
                .max_database_mb = megabytes,
                .low_space_mb = 0,
                .critical_space_mb = 0,
-               .backup_dir = {}});
+               .backup_dir = {},
+               .give_up_after_days = 0});
     connect(robot_);
   }
   // What is recorded now grows this old; the station looks at it in between.

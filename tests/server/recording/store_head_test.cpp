@@ -75,6 +75,21 @@ class StoreHeadTest : public RecordingTest {
   int kills_ = 0;
 };
 
+TEST_F(StoreHeadTest, AHeadThatIsALinkIsNotReadAndReplaced) {
+  start();
+  stop();
+  const fs::path head = storage::head_file_of(path_), elsewhere = folder_ / "elsewhere.json";
+  fs::rename(head, elsewhere);
+  fs::create_symlink(elsewhere, head);
+  const auto size = fs::file_size(elsewhere);
+  const auto loaded = storage::load_head_file(path_);
+  ASSERT_FALSE(loaded);
+  EXPECT_THAT(loaded.error().detail, HasSubstr("is a link"));
+  storage::save_head_file(path_, {});
+  EXPECT_FALSE(is_symlink(head));
+  EXPECT_EQ(fs::file_size(elsewhere), size);
+}
+
 TEST_F(StoreHeadTest, TheSchemaAndTheStoresIdentityAreInTheFileFromTheStart) {
   const storage::Database database{path_};
   EXPECT_EQ(number_without_log("PRAGMA user_version"), static_cast<std::int64_t>(storage::migrations().size()));
