@@ -76,6 +76,15 @@ TEST_F(HttpHeadTest, ABodyInACodingThatIsNotKnownIs415) {
       talk(head("POST /api/v1/runs", json + "Content-Encoding: identity\r\n") + body).starts_with("HTTP/1.1 201 "));
 }
 
+TEST_F(HttpHeadTest, ABodyOfAnotherTypeIsRefusedBeforeItComes) {
+  for (const char* of_body :
+       {"Content-Type: text/plain\r\n", "", "Content-Type: application/json\r\nContent-Encoding: gzip\r\n"}) {
+    const std::string answer =
+        talk(head("POST /api/v1/runs", std::string{of_body} + "Content-Length: 60000\r\nExpect: 100-continue\r\n"));
+    EXPECT_TRUE(answer.starts_with("HTTP/1.1 415 ")) << of_body << answer;
+  }
+}
+
 TEST_F(HttpHeadTest, AMemberThatIsGivenTwiceIs400) {
   connect_robot();
   for (const char* body :
