@@ -166,7 +166,7 @@ std::optional<Response> HttpConnection::refusal_of(RequestParser& parser, const 
   const std::uint64_t length = parser.content_length().value_or(0);
   const std::size_t limit = router_.max_body_bytes(head.method, head.target);
   if (length > limit) return body_too_large(limit);
-  auto admitted = guard_.admit(head);
+  auto admitted = guard_.admit(head, length > 0);
   if (!admitted) return std::move(admitted.error());
   if (!admitted->actor.empty()) {
     if (length <= kMaxBodyBytes) return std::nullopt;

@@ -43,17 +43,15 @@ std::unexpected<Response> not_authenticated(const char* detail, const char* reas
   return std::unexpected<Response>{std::move(response)};
 }
 
-// No body, or one of JSON: what a form of another page can send is neither.
-bool has_json_body(const Request& request) {
+// What is wrong with the body's type or its coding, if there is one. What a form of another page can send is no JSON.
+std::optional<std::unexpected<Response>> refusal_of_body(const Request& request, bool has_body) {
+  if (!has_body) return std::nullopt;
   const std::string content_type = lower(request.header("content-type"));
-  return request.body.empty() || content_type.substr(0, content_type.find(';')) == "application/json";
-}
-
-// What is wrong with the body's type or its coding, if there is one.
-std::optional<std::unexpected<Response>> refusal_of_body(const Request& request) {
-  if (!has_json_body(request)) return refuse(415, "the body must be application/json", "wrong_content_type");
+  if (content_type.substr(0, content_type.find(';')) != "application/json") {
+    return refuse(415, "the body must be application/json", "wrong_content_type");
+  }
   const std::string coding = lower(request.header("content-encoding"));
-  if (request.body.empty() || coding.empty() || coding == "identity") return std::nullopt;
+  if (coding.empty() || coding == "identity") return std::nullopt;
   return refuse(415, "the body must be sent without Content-Encoding", "wrong_content_encoding");
 }
 
@@ -106,6 +104,10 @@ std::expected<RequestGuard::Credential, Response> RequestGuard::credential_of(co
 }
 
 std::expected<identity::Caller, Response> RequestGuard::admit(const Request& request) const {
+  return admit(request, !request.body.empty());
+}
+
+std::expected<identity::Caller, Response> RequestGuard::admit(const Request& request, bool has_body) const {
   const std::string host = request.header("host");
   if (!host_is_ours(host)) {
     return refuse(421, "this station does not answer to that Host; add the name to http.hosts in its configuration",
@@ -122,7 +124,7 @@ std::expected<identity::Caller, Response> RequestGuard::admit(const Request& req
   const bool holds_data = live || path == "/metrics" || path.starts_with("/api/");
   if (!holds_data && !changes_something(request)) return identity::Caller{};
   if (request.method == "POST" && path == kLoginPath) {
-    if (auto refusal = refusal_of_body(request)) return std::move(*refusal);
+    if (auto refusal = refusal_of_body(request, has_body)) return std::move(*refusal);
     return identity::Caller{};
   }
 
@@ -133,7 +135,7 @@ std::expected<identity::Caller, Response> RequestGuard::admit(const Request& req
     return refuse(403, "a request by cookie must say that it comes from the station's own page (Origin)",
                   "wrong_origin");
   }
-  if (auto refusal = refusal_of_body(request)) return std::move(*refusal);
+  if (auto refusal = refusal_of_body(request, has_body)) return std::move(*refusal);
   if (live && !credential->caller.scopes.allow(identity::Scope::read)) {
     return std::unexpected{not_permitted(credential->caller, identity::Scope::read)};
   }

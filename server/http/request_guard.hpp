@@ -27,6 +27,8 @@ class RequestGuard {
 
   // Who asks (nobody where nobody needs to say), or the refusal.
   std::expected<identity::Caller, Response> admit(const Request& request) const;
+  // Of a head alone; `has_body` says whether one follows.
+  std::expected<identity::Caller, Response> admit(const Request& request, bool has_body) const;
 
  private:
   struct Credential {

@@ -64,7 +64,8 @@ std::optional<Caller> Auth::caller_of_session(const std::string& secret) const {
 }
 
 std::string Auth::cookie(const std::string& secret, bool is_secure) const {
-  const auto life_s = secret.empty() ? 0 : kSessionValidity.count() / 1'000'000;
+  constexpr int kLongest_s = 400 * 24 * 60 * 60;  // as long as a browser keeps one
+  const int life_s = secret.empty() ? 0 : kLongest_s;
   return fmt::format("{}={}; HttpOnly; SameSite=Strict; Path=/; Max-Age={}{}", cookie_name_, secret, life_s,
                      is_secure ? "; Secure" : "");
 }

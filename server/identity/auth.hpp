@@ -34,7 +34,8 @@ class Auth {
 
   // Browsers do not separate cookies of one host by port, so each station has a name of its own.
   const std::string& cookie_name() const { return cookie_name_; }
-  // The value of Set-Cookie, which lasts as long as the session does without being used; an empty secret ends it.
+  // The value of Set-Cookie; an empty secret ends the cookie. It is set by signing in and never again, so that no
+  // answer to another tab puts an older session in its place; that the session ends is the station's doing.
   // `is_secure`: for TLS only.
   std::string cookie(const std::string& secret, bool is_secure) const;
 

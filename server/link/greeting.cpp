@@ -1,6 +1,7 @@
 // Checks a Hello and fills a Welcome.
 #include "server/link/greeting.hpp"
 
+#include <fmt/format.h>
 #include <pb_decode.h>
 
 #include <algorithm>
@@ -34,12 +35,18 @@ std::optional<Refusal> refusal_of(const protocol::Hello& hello, std::uint64_t ro
   const bool samples_can_be = hello.oldest_seq <= hello.next_seq && hello.next_seq <= station::kMaxRobotNumber;
   const bool events_can_be =
       hello.oldest_event_seq <= hello.next_event_seq && hello.next_event_seq <= station::kMaxRobotNumber;
-  if (is_robot_id(hello.robot_id) && hello.boot_id != 0 && samples_can_be && events_can_be &&
-      robot_time_us <= station::kMaxRobotNumber) {
-    return std::nullopt;
+  if (!is_robot_id(hello.robot_id) || hello.boot_id == 0 || !samples_can_be || !events_can_be ||
+      robot_time_us > station::kMaxRobotNumber) {
+    return Refusal{rheonaut_REFUSAL_REASON_MALFORMED,
+                   "robot_id must be 1 to 31 of [a-z0-9_-], boot_id not 0, and oldest_seq ≤ next_seq"};
   }
-  return Refusal{rheonaut_REFUSAL_REASON_MALFORMED,
-                 "robot_id must be 1 to 31 of [a-z0-9_-], boot_id not 0, and oldest_seq ≤ next_seq"};
+  // SAFETY: the limit of the time at power counts a schedule's ticks in this period; with 0 it would count nothing.
+  if (hello.sample_period_us == 0 || hello.sample_period_us > station::kMaxPeriodUs) {
+    return Refusal{rheonaut_REFUSAL_REASON_MALFORMED,
+                   fmt::format("sample_period_us is {}; send the time from sample to sample in µs, 1 to {}",
+                               hello.sample_period_us, station::kMaxPeriodUs)};
+  }
+  return std::nullopt;
 }
 
 Refusal refusal_of_too_long_hello() {

@@ -26,10 +26,10 @@ def text_field(number, content):
     return field(number, 2, varint(len(content)) + content)
 
 
-def hello(version=1, robot_id=b"stranger", boot_id=99):
+def hello(version=1, robot_id=b"stranger", boot_id=99, period_us=10000):
     """A framed Hello, written by hand from docs/protocol.md."""
     body = (field(1, 0, varint(version)) + text_field(2, robot_id) + text_field(3, b"")
-            + field(4, 1, boot_id.to_bytes(8, "little")))
+            + field(4, 1, boot_id.to_bytes(8, "little")) + field(7, 0, varint(period_us)))
     frame = field(1, 0, varint(1000)) + text_field(2, body)
     return varint(len(frame)) + frame
 
@@ -156,6 +156,7 @@ class BadInputTest(unittest.TestCase):
     def test_a_malformed_hello_is_refused_with_the_reason(self):
         self.assertIn(b"robot_id must be", self.robot_port(hello(robot_id=b"Not Allowed")))
         self.assertIn(b"boot_id not 0", self.robot_port(hello(boot_id=0)))
+        self.assertIn(b"sample_period_us is 0; send", self.robot_port(hello(period_us=0)))
 
     def test_a_second_robot_of_the_same_name_is_refused_while_the_first_is_there(self):
         answer = self.robot_port(hello(robot_id=b"sim-1", boot_id=4711))

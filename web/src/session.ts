@@ -27,7 +27,6 @@ import { kRefresh_ms, Store } from './store';
 import { browser_channel, kTell_ms, Tabs } from './tabs';
 import { Vitals } from './vitals';
 
-const kRenewCookie_ms = 3_600_000; // it ends 12 hours after the last answer of /me
 const kMaxWatchedAtOnce = 8; // in a larger fleet samples come of the robots that were looked at last
 const kMaxWatchedInFleet = 16; // and in the view of the fleet, of those that are in sight
 const kLook_ms = 5000; // how often the health of the recording is asked for
@@ -131,7 +130,6 @@ export class Session {
     setInterval(() => this.refresh(), kRefresh_ms);
     setInterval(() => this.keep_alive(), kKeepAlive_ms);
     setInterval(() => this.tell_tabs(), kTell_ms);
-    setInterval(() => void this.api.me().catch(() => undefined), kRenewCookie_ms);
     setInterval(() => void this.load_recording(), kLook_ms);
     effect(() => this.tell_tabs(this.held.value.robot_id));
     this.alerts.follow(this.alarms);

@@ -5,7 +5,6 @@
 
 #include "server/api/bodies/limits.hpp"
 #include "server/api/routes/routes.hpp"
-#include "server/http/request_guard.hpp"
 #include "server/identity/auth.hpp"
 #include "server/identity/logins.hpp"
 #include "server/station/station.hpp"
@@ -57,15 +56,9 @@ http::Answer log_out(AccountRoutes parts, http::Request request) {
   co_return response;
 }
 
-// Of a page: its cookie lasts as long again as its session, which this request has renewed.
-http::Answer get_me(AccountRoutes parts, http::Request request) {
+http::Answer get_me(AccountRoutes, http::Request request) {
   const identity::Caller& caller = request.caller;
-  http::Response response = http::json_response(200, me_json(caller.user, caller.actor, caller.scopes));
-  if (caller.session != 0) {
-    const std::string secret = http::cookie_value(request.header("cookie"), parts.auth.cookie_name());
-    response.headers.emplace_back("Set-Cookie", parts.auth.cookie(secret, parts.facts.is_secure()));
-  }
-  co_return response;
+  co_return http::json_response(200, me_json(caller.user, caller.actor, caller.scopes));
 }
 
 // ---- users

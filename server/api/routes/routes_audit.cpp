@@ -40,11 +40,11 @@ Result<storage::AuditFilter> filter_of(const http::Request& request) {
   filter.robot_id = word_of(request, "robot_id");
   filter.actor = word_of(request, "actor");
   filter.action = word_of(request, "action");
-  for (const auto& [name, bound] : {std::pair{"from_us", &filter.from_us}, std::pair{"to_us", &filter.to_us}}) {
-    if (!request.query.contains(name)) continue;
-    const auto time_us = query_number(request, name, 0, kMaxNumber, 0);
-    if (!time_us) return std::unexpected{time_us.error()};
-    *bound = *time_us;
+  const auto window = query_window(request);
+  if (!window) return std::unexpected{window.error()};
+  if (*window) {
+    filter.from_us = (*window)->from_us;
+    filter.to_us = (*window)->to_us;
   }
   const auto before = query_number_cursor(request, "before");
   if (!before) return std::unexpected{before.error()};

@@ -74,16 +74,15 @@ const char* text(LinkState value);
 
 // A robot's clock against the station's, for one boot. True at one moment, and less so the further a sample is from it.
 struct ClockEstimate {
-  static constexpr double kMaxDriftPpm = 100;  // of a cheap crystal against ours
-
   bool valid = false;
   std::int64_t offset_us = 0;  // station steady time = robot time + offset_us
   std::int64_t bound_us = 0;   // of the error of offset_us, when it was measured
   std::uint64_t measured_at_robot_us = 0;
-  double drift_ppm = 0;
+  double drift_ppm = 0;            // growth of offset_us in millionths; 0 before it is measured
+  double most_drift_ppm = 0;       // its size is at most this
   std::int64_t round_trip_us = 0;  // of the latest exchange
 
-  // Of offset_us, at this time of the robot.
+  // Of offset_us, at this time of the robot: bound_us, and most_drift_ppm of the time from the measurement to it.
   std::int64_t uncertainty_us(std::uint64_t robot_time_us) const;
   bool operator==(const ClockEstimate&) const = default;
 };

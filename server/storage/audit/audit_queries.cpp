@@ -20,7 +20,7 @@ AuditPage read_audit(SQLite::Database& database, const AuditFilter& filter) {
       database, fmt::format("SELECT {} FROM audit WHERE entry >= ?1 AND entry < ?2 AND (?3 IS NULL OR robot_id = ?3)"
                             " AND (?4 IS NULL OR actor = ?4)"
                             " AND (?5 IS NULL OR action = ?5 OR substr(action, 1, length(?5) + 1) = ?5 || '.')"
-                            " AND (?6 IS NULL OR at_us >= ?6) AND (?7 IS NULL OR at_us <= ?7)"
+                            " AND (?6 IS NULL OR at_us >= ?6) AND (?7 IS NULL OR at_us < ?7)"
                             " ORDER BY entry DESC LIMIT ?8",
                             kAuditColumns)};
   bind_all(rows, from, below, filter.robot_id, filter.actor, filter.action, filter.from_us, filter.to_us,

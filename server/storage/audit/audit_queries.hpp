@@ -18,10 +18,10 @@ struct AuditFilter {
   std::optional<std::string> robot_id;  // empty text: the station itself
   std::optional<std::string> actor;
   std::optional<std::string> action;    // or all that begin with it and a dot: "control"
-  std::optional<std::int64_t> from_us;  // UTC, both included
-  std::optional<std::int64_t> to_us;
-  std::int64_t before = 0;  // only entries below; 0: from the newest
-  std::size_t limit = 100;  // 1 to 1000
+  std::optional<std::int64_t> from_us;  // UTC
+  std::optional<std::int64_t> to_us;    // not included
+  std::int64_t before = 0;              // only entries below; 0: from the newest
+  std::size_t limit = 100;              // 1 to 1000
 };
 
 struct AuditPage {

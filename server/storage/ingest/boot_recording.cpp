@@ -24,13 +24,16 @@ constexpr std::int64_t kUnknownUtcToleranceUs = 1'000'000;
 constexpr microseconds kHolePatience = 500ms;  // before a hole that does not shrink is asked for
 constexpr microseconds kAskInterval = 1s;
 
-std::int64_t distance(std::uint64_t a, std::uint64_t b) { return std::abs(static_cast<std::int64_t>(a - b)); }
-
-bool goes_on(const Segment& segment, const station::SampleBatch& batch) {
+// The robot's time of a sample of this batch, less the time that the segment stores of it.
+std::int64_t later_us(const station::SampleBatch& batch, const Segment& segment) {
   const std::uint64_t batch_seq0_us = batch.first_robot_time_us - batch.first_seq * batch.context.period_us;
   const std::uint64_t segment_seq0_us = segment.first_robot_time_us - segment.first_seq * segment.context.period_us;
+  return static_cast<std::int64_t>(batch_seq0_us - segment_seq0_us);
+}
+
+bool goes_on(const Segment& segment, const station::SampleBatch& batch) {
   const std::int64_t utc_tolerance_us = batch.clock_uncertainty_us < 0 ? kUnknownUtcToleranceUs : kUtcToleranceUs;
-  return segment.context == batch.context && distance(batch_seq0_us, segment_seq0_us) <= kTimeToleranceUs &&
+  return segment.context == batch.context && std::abs(later_us(batch, segment)) <= kTimeToleranceUs &&
          std::abs(segment.utc_offset_us - batch.utc_offset_us) <= utc_tolerance_us &&
          (segment.clock_uncertainty_us < 0) == (batch.clock_uncertainty_us < 0);
 }
@@ -38,7 +41,7 @@ bool goes_on(const Segment& segment, const station::SampleBatch& batch) {
 // How wrong the segment's estimate of UTC may be for the samples of this batch; -1: there was none.
 std::int64_t uncertainty_in(const Segment& segment, const station::SampleBatch& batch) {
   if (batch.clock_uncertainty_us < 0) return -1;
-  return batch.clock_uncertainty_us + std::abs(batch.utc_offset_us - segment.utc_offset_us);
+  return batch.clock_uncertainty_us + std::abs(batch.utc_offset_us - segment.utc_offset_us + later_us(batch, segment));
 }
 
 void add_gap(std::vector<LostRange>& gaps, LostRange gap) {

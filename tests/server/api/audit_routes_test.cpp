@@ -185,7 +185,12 @@ TEST_F(AuditRoutesTest, PagesGoBackToTheFirstEntryAndTellTheHead) {
   EXPECT_THAT(actions("?robot_id=&action=station"), ElementsAre("station.started"));
   EXPECT_THAT(actions("?actor=nobody"), IsEmpty());
   EXPECT_THAT(actions("?to_us=5"), IsEmpty());
-  for (const char* bad : {"?limit=0", "?before=0", "?from_us=x", "?who=anna"}) {
+  const std::int64_t started_us = latest("station.started")["at_us"];
+  const auto until = [&](std::int64_t us) { return actions("?action=station&to_us=" + std::to_string(us)); };
+  EXPECT_THAT(until(started_us), IsEmpty()) << "to_us is the first moment after, as in every list";
+  EXPECT_THAT(until(started_us + 1), ElementsAre("station.started"));
+  EXPECT_THAT(actions("?action=station&from_us=" + std::to_string(started_us)), ElementsAre("station.started"));
+  for (const char* bad : {"?limit=0", "?before=0", "?from_us=x", "?who=anna", "?to_us=0", "?from_us=7&to_us=7"}) {
     EXPECT_EQ(ask("GET", std::string{"/api/v1/audit"} + bad).status, 400) << bad;
   }
 }

@@ -15,6 +15,7 @@ protocol::Hello hello() {
   hello.protocol_version = protocol::kProtocolVersion;
   std::strcpy(hello.robot_id, "r1");
   hello.boot_id = 7;
+  hello.sample_period_us = 10'000;
   hello.oldest_seq = 10;
   hello.next_seq = 20;
   return hello;
@@ -57,6 +58,24 @@ TEST(Greeting, NumbersThatCannotBeAreMalformed) {
   without_boot.boot_id = 0;
   EXPECT_EQ(reason_for(without_boot), rheonaut_REFUSAL_REASON_MALFORMED);
   EXPECT_EQ(reason_for(hello(), station::kMaxRobotNumber + 1), rheonaut_REFUSAL_REASON_MALFORMED);
+}
+
+TEST(Greeting, APeriodThatCannotBeIsMalformedAndSaysWhatToSend) {
+  for (const std::uint32_t period_us : {1U, 10'000U, 10'000'000U}) {
+    auto good = hello();
+    good.sample_period_us = period_us;
+    EXPECT_EQ(reason_for(good), rheonaut_REFUSAL_REASON_NONE) << period_us;
+  }
+  for (const std::uint32_t period_us : {0U, 10'000'001U, 0xFFFFFFFFU}) {
+    auto bad = hello();
+    bad.sample_period_us = period_us;
+    const auto refusal = link::refusal_of(bad, 0);
+    ASSERT_TRUE(refusal) << period_us;
+    EXPECT_EQ(refusal->reason, rheonaut_REFUSAL_REASON_MALFORMED);
+    EXPECT_EQ(refusal->detail, "sample_period_us is " + std::to_string(period_us) +
+                                   "; send the time from sample to sample in µs, 1 to 10000000");
+    EXPECT_LT(refusal->detail.size(), sizeof rheonaut_Welcome::detail);
+  }
 }
 
 TEST(Greeting, AHelloIsFoundInAFrameWhateverItSays) {

@@ -283,6 +283,8 @@ TEST_F(AuditTest, PagesAreFilteredAndGoOnWhereTheLastOneEnded) {
   all.from_us = 1'011'900;
   all.to_us = 1'011'910;
   EXPECT_EQ(page(all).entries.size(), 5u);
+  all.to_us = 1'011'909;  // an entry is of this moment
+  EXPECT_EQ(page(all).entries.size(), 4u);
   all.robot_id = "dory";
   EXPECT_THAT(page(all).entries, IsEmpty());
 }

@@ -32,7 +32,7 @@ class BootSegmentsTest : public ::testing::Test {
     boots_.start(boot, 0);
     return boot;
   }
-  void receive(storage::BootEntry& boot, std::uint64_t first_seq, std::size_t samples, float position_m = 1) {
+  static station::SampleBatch batch_of(std::uint64_t first_seq, std::size_t samples, float position_m = 1) {
     station::SampleBatch batch;
     batch.first_seq = first_seq;
     batch.first_robot_time_us = first_seq * 10'000;
@@ -40,9 +40,15 @@ class BootSegmentsTest : public ::testing::Test {
     batch.received_at_us = static_cast<std::int64_t>(first_seq) + 1'000;
     batch.samples.resize(samples);
     for (station::Sample& sample : batch.samples) sample.position_m = position_m;
+    return batch;
+  }
+  void receive(storage::BootEntry& boot, const station::SampleBatch& batch) {
     boot.recording.append(batch, 0, 0);
     boots_.watch(boot);
-    queue_.count_received(samples);
+    queue_.count_received(batch.samples.size());
+  }
+  void receive(storage::BootEntry& boot, std::uint64_t first_seq, std::size_t samples, float position_m = 1) {
+    receive(boot, batch_of(first_seq, samples, position_m));
   }
   void build_commit() { queue_.build_commit(boots_.with_records()); }
 
@@ -156,6 +162,30 @@ TEST_F(BootSegmentsTest, AReaderFindsGapsWhereverTheyWait) {
   EXPECT_THAT(gaps(nemo_), ElementsAre("10-19 invalid", "50-59 invalid"));
   EXPECT_THAT(gaps(nemo_, {20, 51}), ElementsAre("50-59 invalid"));
   EXPECT_THAT(gaps(connect(20, "dory")), IsEmpty());
+}
+
+// A segment stores one time and a period for all its samples; those of a batch may lie up to 100 µs beside them.
+TEST_F(BootSegmentsTest, TheUncertaintyOfUtcHoldsForABatchWhoseTimesLieBesideTheSegments) {
+  const auto stated_us = [this] {
+    const auto segments = waiting_samples(queue_, nemo_, kAllSamples, kNoLimit);
+    EXPECT_EQ(segments.size(), 1u);
+    return segments.at(0).clock_uncertainty_us;
+  };
+  const auto send = [this](std::uint64_t first_seq, std::uint64_t later_us, std::int64_t offset_us) {
+    station::SampleBatch batch = batch_of(first_seq, 5);
+    batch.clock_uncertainty_us = 300;
+    batch.first_robot_time_us += later_us;
+    batch.utc_offset_us += offset_us;
+    receive(nemo_, batch);
+  };
+  send(0, 0, 0);
+  EXPECT_EQ(stated_us(), 300);
+  send(5, 90, -90);  // another time of the robot, the same UTC
+  EXPECT_EQ(stated_us(), 300);
+  send(10, 90, 0);
+  EXPECT_EQ(stated_us(), 390);
+  send(15, 90, 40);
+  EXPECT_EQ(stated_us(), 430);
 }
 
 }  // namespace
