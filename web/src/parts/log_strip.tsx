@@ -61,8 +61,8 @@ export function describe({ event, command, note, position_sd_m }: LogLine): [ton
       .join('');
     const detail = event.detail ? ` · ${event.detail}` : '';
     const position = event.position_m === null ? '' : millimetres(event.position_m);
-    const unknown = event.kind === 'position_zeroed' ? ' mm' : ' mm, ± not known'; // zeroed: it is 0 by command
-    const spread = position_sd_m === null ? unknown : ` ${plus_minus(position_sd_m)} mm`;
+    const is_unknown = position_sd_m === null && event.kind !== 'position_zeroed'; // zeroed: it is 0 by command
+    const spread = is_unknown ? ' mm, ± not known' : position_sd_m ? ` ${plus_minus(position_sd_m)} mm` : ' mm';
     const at = position && ` · controller at ${position}${spread}`;
     const way_out = kWaysOut[event.kind] ? ` · ${kWaysOut[event.kind]}` : '';
     const caution = /lost|fault|limit|lapsed|uncertain|mismatch$/.test(event.kind);

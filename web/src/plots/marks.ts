@@ -118,7 +118,7 @@ const line_of = (what: { event?: EventRecord; command?: CommandRecord }): LogLin
   event: what.event ?? null,
   command: what.command ?? null,
   note: null,
-  position_sd_m: null,
+  position_sd_m: undefined, // the band around the trace shows it
 });
 
 function mark_of(line: LogLine, at_s: number): Mark {
