@@ -1,5 +1,6 @@
 // The last events and commands, newest first.
 
+import type { EventRecord } from '../api';
 import { clock_time, millimetres, percent, plus_minus, words } from '../format';
 import { kWaysOut, sentence } from '../reasons';
 import type { Session } from '../session';
@@ -53,10 +54,9 @@ export function describe({ event, command, note, position_sd_m }: LogLine): [ton
         : event.kind === 'sub_state_changed'
           ? ` to ${event.sub_state}`
           : '';
-    const much = event.kind === 'disturbance' ? ` ${millimetres(event.value)} mm` : '';
     const of_latch = event.kind === 'emergency' ? event.emergency_cause : null;
     const cause = [of_latch ?? event.cause]
-      .filter((said) => said && said !== 'none')
+      .filter((said) => said && said !== 'none' && event.kind !== 'time_step') // its only cause is "time"
       .map((said) => ` · ${words(said)}`)
       .join('');
     const detail = event.detail ? ` · ${event.detail}` : '';
@@ -69,10 +69,18 @@ export function describe({ event, command, note, position_sd_m }: LogLine): [ton
     return [
       alarm ? 'alarm' : caution ? 'caution' : '',
       'event',
-      words(event.kind) + much + where + cause + detail + at + way_out,
+      words(event.kind) + much_of(event) + where + cause + detail + at + way_out,
     ];
   }
   return ['quiet', 'page', note ?? ''];
+}
+
+// By how much, or to what: docs/protocol.md lists what the value of an event is.
+function much_of({ kind, value }: EventRecord): string {
+  if (value === null) return '';
+  if (kind === 'disturbance') return ` ${millimetres(value)} mm`;
+  if (kind === 'setpoint_changed') return ` to ${millimetres(value)} mm`;
+  return kind === 'time_step' ? ` of ${value.toFixed(2)} s` : '';
 }
 
 export function arguments_text({ execute_at_robot_us: at_us, ...values }: Record<string, unknown>): string {

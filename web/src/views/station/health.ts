@@ -113,7 +113,7 @@ function queue_line({ queued_samples }: Recording, fleet: Fleet): Line {
 
 function writes_line({ counters }: Recording, pace: Pace | null, fleet: Fleet): Line {
   const { commits_failed } = counters;
-  if (!pace) return line('unknown', '', 'Measured for the first seconds that this page is open.');
+  if (!pace) return line('unknown', '', 'It is known a few seconds after the page was opened.');
   const value = `${count(pace.samples_per_s)} samples/s, ${(pace.commits / pace.over_s).toFixed(1)} commits/s`;
   if (pace.commits === 0 && fleet.samples_per_s > 0)
     return line('bad', value, `No write for ${span_text(pace.over_s)}, while robots send. The station’s log says why.`);
