@@ -128,7 +128,7 @@ test('what a fit is worth is said in sentences', () => {
   } as unknown as Identified;
   expect(sentences_of(fit)).toEqual([
     'Fractional is clearly better than second order: its AIC is lower by 54.',
-    'What is left over is not noise alone: the true errors are larger than the ± below.',
+    'What is left over is not noise alone: the true errors are larger than the ± of the parameters.',
     'b1 is hardly known: a duty that changes faster, or another run, tells more.',
   ]);
   expect(sentences_of({ ...fit, residuals_are_white: true, aic: -13015, end: 'time_limit' })).toEqual([
