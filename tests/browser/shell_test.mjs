@@ -178,6 +178,33 @@ const steps = {
     }
   },
 
+  async 'on a phone whatever Tab leads to is in sight, forward and back'() {
+    await page.setViewportSize({ width: 390, height: 844 });
+    for (const view of kViews) {
+      await page.click(`#open-${view}`);
+      await shown[view]();
+      await page.evaluate(() => document.activeElement.blur());
+      const hidden = [];
+      let reached = 0;
+      for (const key of [...Array(60).fill('Tab'), ...Array(60).fill('Shift+Tab')]) {
+        await page.keyboard.press(key);
+        const found = await page.evaluate(() => {
+          const focused = document.activeElement;
+          const { left, top, width, height } = focused.getBoundingClientRect();
+          const middle = (from, size, end) => Math.min(end - 1, Math.max(0, from + size / 2));
+          const over = document.elementFromPoint(middle(left, width, innerWidth), middle(top, height, innerHeight));
+          const is_seen = !over || focused.contains(over) || over.contains(focused);
+          return { is_body: focused === document.body, under: is_seen ? '' : `${focused.outerHTML.slice(0, 80)} under ${over.outerHTML.slice(0, 80)}` };
+        });
+        if (!found.is_body) reached += 1;
+        if (found.under !== '') hidden.push(found.under);
+      }
+      assert.ok(reached > 20, `${view}: ${reached}`);
+      assert.deepEqual(hidden, [], view);
+    }
+    await page.setViewportSize({ width: 1440, height: 900 });
+  },
+
   async 'axe finds nothing, in light and in dark'() {
     for (const view of kViews) {
       await page.click(`#open-${view}`);

@@ -80,7 +80,7 @@ export const kNothingRead: Readout = {
   missing: 0,
 };
 
-const kSameMoment_us = 200_000; // an event comes ahead of the samples of its time
+export const kSameMoment_us = 200_000; // an event comes ahead of the samples of its time
 
 const end_of_samples = ({ boot_id, first_robot_time_us, period_us, position_m, position_sd_m }: SamplesMessage) => ({
   boot_id,

@@ -20,7 +20,7 @@ export interface LogLine {
   event: EventRecord | null;
   command: CommandRecord | null;
   note: string | null; // of the page itself
-  position_sd_m: number | null; // of the position in an event; null: not known for its moment
+  position_sd_m: number | null | undefined; // of the position in an event; null: not known; undefined: not looked up
 }
 
 export class Store {

@@ -33,6 +33,15 @@ test('a position has a ±, or the line says that it is not known', () => {
   expect(line({ kind: 'position_zeroed', position_m: 0 })[2]).toMatch(/controller at 0.0 mm$/);
 });
 
+test('a setpoint, a disturbance and a step of the time have their size', () => {
+  expect(line({ kind: 'setpoint_changed', cause: 'command', value: 0.1 })[2]).toBe(
+    'setpoint changed to 100.0 mm · command',
+  );
+  expect(line({ kind: 'disturbance', value: -0.05 })[2]).toBe('disturbance −50.0 mm');
+  expect(line({ kind: 'time_step', cause: 'time', value: 0.154 })[2]).toBe('time step of 0.15 s');
+  expect(line({ kind: 'setpoint_changed', value: null })[2]).toBe('setpoint changed');
+});
+
 test('the arguments of a command have their units, and a timed one says when, at the end', () => {
   expect(arguments_text({ execute_at_robot_us: 7_370_637, mode: 'auto', setpoint_m: 0.1 })).toBe(
     ' auto 100.0 mm at 7.371 s of the robot’s clock',

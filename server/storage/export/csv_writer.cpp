@@ -19,7 +19,7 @@ namespace {
 constexpr std::size_t kCsvPageSamples = 2'000;
 constexpr std::size_t kPieceBytes = 384 * 1024;  // of a grid, whose gaps may be long
 constexpr std::int64_t kSecondUs = 1'000'000;
-constexpr std::size_t kBeforeTimes = 4;  // so many fields of a batch stand before the times of receipt
+constexpr std::size_t kBeforeTimes = 4;  // fields of a batch before the times of receipt
 constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
 
 // Empty for none.

@@ -190,7 +190,7 @@ constexpr Meaning kMeanings[] = {
     {"", "clock_offset_s", "its time plus this is seconds since the first sample of the span"},
     {"", "clock_sd_s", "standard deviation of clock_offset_s; NULL: not known"},
     {"", "correlation", "correlation of both motions; NULL: another method"},
-    {"", "motion_ratio", "its motion is so many times the robot's own record; NULL: another method"},
+    {"", "motion_ratio", "its motion divided by the robot's own record of it; NULL: another method"},
     {"", "zero_is_kept", "0: zero_offset_m was estimated from the robot's own record"},
     {"", "zero_offset_m", "was added to its positions"},
     {"", "zero_sd_m", "standard deviation of zero_offset_m; NULL: not known"},

@@ -10,7 +10,7 @@
 namespace server::storage {
 namespace {
 
-// "INSERT INTO sample (row, …) VALUES (?,…),(?,…)" for so many rows.
+// "INSERT INTO sample (row, …) VALUES (?,…),(?,…)" for this number of rows.
 std::string insert_query(std::size_t rows) {
   std::string sql = "INSERT INTO sample (row";
   std::string one_row = "(?";

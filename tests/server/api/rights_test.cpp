@@ -106,7 +106,7 @@ TEST_F(RightsTest, ARefusalSaysWhichRoleWouldDoIt) {
   EXPECT_EQ(needs("/robots/r1/commands", {{"kind", "ping"}}), nullptr) << "it was revoked";
 }
 
-// It moves nothing: who may command at all may ask whether the robot is there, whoever controls it.
+// It moves nothing: everybody with the scope may ask whether the robot is there, also while another actor controls it.
 TEST_F(RightsTest, APingNeedsTheScopeCommandAndNoControl) {
   connect_robot();
   ASSERT_TRUE(station.control({"r1", "user:anna/session:4", "", station::ControlAction::take, 60s, ""}));

@@ -6,6 +6,8 @@ import { count, milliseconds_of_us, percent, volts_of_mv } from '../format';
 import { recording_line } from '../recording_line';
 import { changed_limits_of, type Robot } from '../robot';
 
+const kNotReported = null; // rssi_dbm 0, supply_mv null: the robot does not measure it
+
 export function LinkPanel({ robot, is_current = true }: { robot: Robot; is_current?: boolean }) {
   const state = robot.state.value;
   const { stale } = robot.readout.value;
@@ -35,8 +37,12 @@ export function LinkPanel({ robot, is_current = true }: { robot: Robot; is_curre
           tone={(fill ?? 0) > 0.8 ? 'caution' : ''}
           title="Fill of the robot's ring of samples"
         />
-        <Figure name="Supply" unit="V" value={volts_of_mv(status?.supply_mv)} />
-        <Figure name="Signal" unit="dBm" value={count(status?.rssi_dbm)} />
+        <Figure
+          name="Supply"
+          unit="V"
+          value={status?.supply_mv === null ? kNotReported : volts_of_mv(status?.supply_mv)}
+        />
+        <Figure name="Signal" unit="dBm" value={status?.rssi_dbm === 0 ? kNotReported : count(status?.rssi_dbm)} />
         <Figure
           name="Missed ticks"
           unit=""
@@ -97,14 +103,18 @@ function RecordingFigures({ robot, is_current }: { robot: Robot; is_current: boo
   );
 }
 
-function Figure(props: { name: string; unit: string; value: string; tone?: string; title?: string }) {
+function Figure(props: { name: string; unit: string; value: string | null; tone?: string; title?: string }) {
   return (
     <div class={props.tone ?? ''} title={props.title}>
       <dt>{props.name}</dt>
-      <dd>
-        {props.value}
-        <span class="unit">{props.unit}</span>
-      </dd>
+      {props.value === null ? (
+        <dd class="quiet">not reported</dd>
+      ) : (
+        <dd>
+          {props.value}
+          <span class="unit">{props.unit}</span>
+        </dd>
+      )}
     </div>
   );
 }

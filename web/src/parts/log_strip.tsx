@@ -1,6 +1,6 @@
 // The last events and commands, newest first.
 
-import type { CommandRecord } from '../api';
+import type { CommandRecord, EventRecord } from '../api';
 import { clock_time, count, millimetres, percent, plus_minus, words } from '../format';
 import { kWaysOut, sentence } from '../reasons';
 import type { Session } from '../session';
@@ -54,23 +54,22 @@ export function describe({ event, command, note, position_sd_m }: LogLine): [ton
         : event.kind === 'sub_state_changed'
           ? ` to ${event.sub_state}`
           : '';
-    const much = event.kind === 'disturbance' ? ` ${millimetres(event.value)} mm` : '';
     const of_latch = event.kind === 'emergency' ? event.emergency_cause : null;
     const cause = [of_latch ?? event.cause]
-      .filter((said) => said && said !== 'none')
+      .filter((said) => said && said !== 'none' && event.kind !== 'time_step') // its only cause is "time"
       .map((said) => ` · ${words(said)}`)
       .join('');
     const detail = event.detail ? ` · ${event.detail}` : '';
     const position = event.position_m === null ? '' : millimetres(event.position_m);
-    const unknown = event.kind === 'position_zeroed' ? ' mm' : ' mm, ± not known'; // zeroed: it is 0 by command
-    const spread = position_sd_m === null ? unknown : ` ${plus_minus(position_sd_m)} mm`;
+    const is_unknown = position_sd_m === null && event.kind !== 'position_zeroed'; // zeroed: it is 0 by command
+    const spread = is_unknown ? ' mm, ± not known' : position_sd_m ? ` ${plus_minus(position_sd_m)} mm` : ' mm';
     const at = position && ` · controller at ${position}${spread}`;
     const way_out = kWaysOut[event.kind] ? ` · ${kWaysOut[event.kind]}` : '';
     const caution = /lost|left_out|fault|limit|lapsed|uncertain|mismatch$/.test(event.kind);
     return [
       alarm ? 'alarm' : caution ? 'caution' : '',
       'event',
-      words(event.kind) + much + where + cause + detail + at + way_out,
+      words(event.kind) + much_of(event) + where + cause + detail + at + way_out,
     ];
   }
   return ['quiet', 'page', note ?? ''];
@@ -83,6 +82,14 @@ export function renewals_text({ further_renewals, last_renewed_at_us, reason }: 
     return reason === 'station_restarted' ? ' and an unknown number more' : ' and more, not counted yet';
   const until = last_renewed_at_us ? ` until ${clock_time(last_renewed_at_us / 1000)}` : '';
   return ` and ${count(further_renewals)} more${until}`;
+}
+
+// By how much, or to what: docs/protocol.md lists what the value of an event is.
+function much_of({ kind, value }: EventRecord): string {
+  if (value === null) return '';
+  if (kind === 'disturbance') return ` ${millimetres(value)} mm`;
+  if (kind === 'setpoint_changed') return ` to ${millimetres(value)} mm`;
+  return kind === 'time_step' ? ` of ${value.toFixed(2)} s` : '';
 }
 
 export function arguments_text({ execute_at_robot_us: at_us, ...values }: Record<string, unknown>): string {

@@ -108,7 +108,7 @@ function WhoIsIn({ session }: { session: Session }) {
   if (!me) return null;
   const leave = () => session.log_out().catch((error: Error) => session.store.note(error.message));
   return (
-    <span class="who">
+    <span class="signed-in">
       <span id="who" title={me.actor}>
         {me.user || 'by link'} <span class="quiet">{me.role}</span>
       </span>

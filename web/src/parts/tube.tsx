@@ -2,7 +2,7 @@
 // it would come to rest. What can be moved in it is handed in; by itself it commands nothing.
 
 import type { ComponentChildren, RefObject } from 'preact';
-import { kSpread_sd, m_to_millimetres, millimetres } from '../format';
+import { kSpread_sd, millimetres } from '../format';
 import { range_splits, round_step } from '../range';
 import type { Readout } from '../robot';
 import type { Known } from '../vessel/coast';
@@ -90,7 +90,7 @@ export function Scale({ places }: { places: TubePlaces }) {
       ))}
       {range_splits([from_m, to_m]).map((value_m) => (
         <b key={value_m} style={{ left: places.at(value_m) }}>
-          <span>{Math.round(m_to_millimetres(value_m))}</span>
+          <span>{millimetres(value_m, 0)}</span>
         </b>
       ))}
     </div>

@@ -21,38 +21,45 @@ export interface RunStretch {
 
 const kMost = 4000; // the oldest are dropped
 
+interface Kept {
+  at_s: number;
+  mark: Mark;
+  line: LogLine | null; // that it was made of
+}
+
 export class Marks {
   runs: RunStretch[] = [];
-  private moments: Mark[] = []; // by time
-  private readonly by_key = new Map<string, Mark>();
+  private moments: Kept[] = []; // by time
+  private readonly by_key = new Map<string, Kept>();
+
+  // `known`: of a line what is known at the moment that is shown, or the line itself where that is all of it.
+  constructor(private readonly known: (line: LogLine) => LogLine = (line) => line) {}
 
   get all(): readonly Mark[] {
-    return this.moments;
+    return this.moments.map((kept) => this.shown(kept));
   }
 
   take_events(events: EventRecord[]): void {
-    this.put(events.map((event) => mark_of(line_of({ event }), event.received_at_us)));
+    this.put(events.map((event) => kept_of(line_of({ event }), event.received_at_us)));
   }
 
   take_commands(commands: CommandRecord[]): void {
-    this.put(commands.map((command) => mark_of(line_of({ command }), command.submitted_at_us)));
+    this.put(commands.map((command) => kept_of(line_of({ command }), command.submitted_at_us)));
   }
 
   // What has happened since; `lines` are of every robot, and of the page.
   take_log(lines: readonly LogLine[], robot_id: string): void {
     const ours = lines.filter((line) => line.robot_id === robot_id && line.note === null);
-    this.put(ours.map((line) => mark_of(line, line.at_ms * 1000)));
+    this.put(ours.map((line) => kept_of(line, line.at_ms * 1000)));
   }
 
   take_markers(markers: MarkerRecord[]): void {
     this.put(
-      markers.map(({ marker_id, utc_us, made_at_us, text }) => ({
-        key: `marker-${marker_id}`,
-        at_s: (utc_us ?? made_at_us) / 1e6,
-        kind: 'marker',
-        tone: '',
-        text: text || 'marker',
-      })),
+      markers.map(({ marker_id, utc_us, made_at_us, text }): Kept => {
+        const at_s = (utc_us ?? made_at_us) / 1e6;
+        const mark: Mark = { key: `marker-${marker_id}`, at_s, kind: 'marker', tone: '', text: text || 'marker' };
+        return { at_s, mark, line: null };
+      }),
     );
   }
 
@@ -66,7 +73,7 @@ export class Marks {
   }
 
   within(from_s: number, to_s: number): Mark[] {
-    return this.moments.slice(this.first_from(from_s), this.first_from(to_s));
+    return this.moments.slice(this.first_from(from_s), this.first_from(to_s)).map((kept) => this.shown(kept));
   }
 
   // The one next to a time, if there is one so near.
@@ -82,17 +89,22 @@ export class Marks {
     let [low, high] = [0, this.moments.length];
     while (low < high) {
       const middle = (low + high) >> 1;
-      if ((this.moments[middle] as Mark).at_s < at_s) low = middle + 1;
+      if ((this.moments[middle] as Kept).at_s < at_s) low = middle + 1;
       else high = middle;
     }
     return low;
   }
 
-  private put(marks: Mark[]): void {
-    if (marks.length === 0) return;
-    for (const mark of marks) this.by_key.set(mark.key, mark);
+  private shown({ mark, line }: Kept): Mark {
+    const known = line && this.known(line);
+    return known === line ? mark : mark_of(known as LogLine, mark.at_s);
+  }
+
+  private put(added: Kept[]): void {
+    if (added.length === 0) return;
+    for (const kept of added) this.by_key.set(kept.mark.key, kept);
     const sorted = [...this.by_key.values()].sort((a, b) => a.at_s - b.at_s);
-    for (const mark of sorted.slice(0, Math.max(0, sorted.length - kMost))) this.by_key.delete(mark.key);
+    for (const { mark } of sorted.slice(0, Math.max(0, sorted.length - kMost))) this.by_key.delete(mark.key);
     this.moments = sorted.slice(-kMost);
   }
 }
@@ -106,10 +118,15 @@ const line_of = (what: { event?: EventRecord; command?: CommandRecord }): LogLin
   event: what.event ?? null,
   command: what.command ?? null,
   note: null,
-  position_sd_m: null,
+  position_sd_m: undefined, // the band around the trace shows it
 });
 
-function mark_of(line: LogLine, at_us: number): Mark {
+function mark_of(line: LogLine, at_s: number): Mark {
   const [tone, , text] = describe(line);
-  return { key: line.key, at_s: at_us / 1e6, kind: line.command ? 'command' : 'event', tone, text };
+  return { key: line.key, at_s, kind: line.command ? 'command' : 'event', tone, text };
+}
+
+function kept_of(line: LogLine, at_us: number): Kept {
+  const at_s = at_us / 1e6;
+  return { at_s, mark: mark_of(line, at_s), line };
 }

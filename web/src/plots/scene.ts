@@ -6,6 +6,7 @@ import { signal, type Signal } from '@preact/signals';
 import { kAxis_px } from '../chart';
 import { kSpread_sd, plus_minus } from '../format';
 import type { SampleRows } from '../samples';
+import type { LogLine } from '../store';
 import { Deck } from './deck';
 import { DerivedRows, type DerivedSpec } from './derived';
 import { Marks } from './marks';
@@ -29,13 +30,14 @@ export interface SceneSource {
   shift_s(): number; // UTC less the times of the rows
   edge_s(page_ms: number): number;
   is_still(): boolean;
+  known?(line: LogLine): LogLine; // see Marks; absent: what is known now
 }
 
 export abstract class Scene {
   readonly note = signal('');
   readonly texts = new Map<string, Signal<string>>(); // of the cursor, by strip
   readonly has_predicted = signal(false); // in what is shown
-  readonly marks = new Marks();
+  readonly marks: Marks;
   readonly predictions = new PredictedBackdrop();
   readonly drawn = new Set<() => void>(); // called after each drawing
   readonly state: Signal<PlotState>;
@@ -55,6 +57,7 @@ export abstract class Scene {
   ) {
     this.state = signal({ is_live: true, span_s: axis.span_s, range: '' });
     this.rows = new DerivedRows(source.rows, []);
+    this.marks = new Marks(source.known);
     this.hand = new PlotHand({
       ...ways(this),
       point: (at_px) => this.point(at_px),

@@ -67,6 +67,22 @@ test('samples come page by page, and those of another boot are left out', async 
   expect(found.map(({ seq }) => seq)).toEqual([1, 2]);
 });
 
+test('samples of a later boot are read when they are asked for, and nothing after them', async () => {
+  const asked: (string | null)[] = [];
+  const spans = [0, 1, 1, 2, 3];
+  const api = {
+    samples: (_: number, after: string | null) => {
+      asked.push(after);
+      const page = after === null ? 0 : Number(after);
+      const samples = [{ span: spans[page], seq: page }];
+      return Promise.resolve({ samples, next: page + 1 < spans.length ? String(page + 1) : null } as never);
+    },
+  };
+  expect((await samples_of(api, 3, [1])).map(({ seq }) => seq)).toEqual([1, 2]);
+  expect(asked).toEqual([null, '1', '2', '3']);
+  expect((await samples_of(api, 3, [0, 2])).map(({ seq }) => seq)).toEqual([0, 3]);
+});
+
 test('a long stretch is thinned, and no peak is lost', () => {
   const residual = Array.from({ length: 1000 }, (_, at) => (at === 501 ? 5 : at === 777 ? -5 : Math.sin(at)));
   const traces = {
@@ -112,7 +128,7 @@ test('what a fit is worth is said in sentences', () => {
   } as unknown as Identified;
   expect(sentences_of(fit)).toEqual([
     'Fractional is clearly better than second order: its AIC is lower by 54.',
-    'What is left over is not noise alone: the true errors are larger than the ± below.',
+    'What is left over is not noise alone: the true errors are larger than the ± of the parameters.',
     'b1 is hardly known: a duty that changes faster, or another run, tells more.',
   ]);
   expect(sentences_of({ ...fit, residuals_are_white: true, aic: -13015, end: 'time_limit' })).toEqual([

@@ -1,6 +1,6 @@
 // What the robot measured during a step, as it is drawn beside the prediction.
 import { expect, test } from 'vitest';
-import { measured_parts } from '../../src/views/design/verify_plot';
+import { measured_parts, spans_of } from '../../src/views/design/verify_plot';
 
 const sample = (seq: number, span = 0) => ({
   span,
@@ -8,6 +8,11 @@ const sample = (seq: number, span = 0) => ({
   robot_time_us: seq * 10_000,
   position_m: seq / 1000,
   position_sd_m: 0.001,
+});
+const row = ({ seq, position_m, position_sd_m }: ReturnType<typeof sample>) => ({
+  t_s: expect.closeTo((seq - 100) / 100, 9) as number,
+  position_m,
+  sd_m: position_sd_m,
 });
 const step = { span: 0, first_seq: 100, last_seq: 199 };
 
@@ -19,6 +24,17 @@ test('a step begins at its first sample, and has nothing of others', () => {
   expect(part![0]).toEqual({ t_s: 0, position_m: 0.1, sd_m: 0.001 });
   expect(part!.at(-1)!.t_s).toBeCloseTo(0.99);
   expect(measured_parts(samples, step, 0.5)[0]!.at(-1)!.t_s).toBeCloseTo(0.5);
+});
+
+test('a step after the robot has restarted is drawn from the samples of its own boot', () => {
+  const steps = [
+    { ...step, span: 1 },
+    { ...step, span: 1 },
+    { ...step, span: 3 },
+  ];
+  expect(spans_of(steps.map((each) => ({ step: each })))).toEqual([1, 3]);
+  const samples = [...Array.from({ length: 3 }, (_, at) => sample(100 + at)), sample(100, 1), sample(101, 1)];
+  expect(measured_parts(samples, steps[0]!, 60)).toEqual([[sample(100, 1), sample(101, 1)].map(row)]);
 });
 
 test('no line is drawn over samples that are missing, nor where the ± is not known', () => {

@@ -3,6 +3,7 @@ import { expect, test } from 'vitest';
 import type { CommandRecord, EventRecord, RunRecord } from '../../src/api';
 import { Marks } from '../../src/plots/marks';
 import { chosen_strips, columns_of, PlotSettings } from '../../src/plots/strips';
+import { line_at } from '../../src/views/runs/replay/replay';
 
 const command = (id: string, at_us: number, state = 'verified') =>
   ({
@@ -46,6 +47,29 @@ test('the log of another robot is not ours, and what is known from the station i
   marks.take_log([{ ...line, key: 'event-a-1-1-5000000', robot_id: 'a', event: event(1, 5e6) }], 'a');
   marks.take_events([event(1, 5e6)]);
   expect(marks.all).toHaveLength(1);
+});
+
+test('a mark of a replay has of a command what was known at the moment, there and back', () => {
+  let now_us = 0;
+  const marks = new Marks((line) => line_at(line, now_us));
+  const refused = {
+    ...command('5', 2e6, 'rejected'),
+    reason: 'latched',
+    sent_after_us: 50_000,
+    acknowledged_after_us: null,
+    ended_at_us: 3e6,
+  } as CommandRecord;
+  marks.take_commands([refused]);
+  const shown = (at_s: number) => {
+    now_us = at_s * 1e6;
+    return { under_cursor: marks.near(2, 0.1), drawn: marks.within(0, 9)[0] };
+  };
+  for (const at_s of [3, 2.5, 3]) {
+    const { under_cursor, drawn } = shown(at_s);
+    expect(under_cursor).toEqual(drawn);
+    expect(drawn?.tone).toBe(at_s === 3 ? 'caution' : '');
+    expect(drawn?.text).toMatch(at_s === 3 ? /rejected: / : /· sent$/);
+  }
 });
 
 test('a run that is open has no end', () => {

@@ -125,5 +125,6 @@ test('how an entry reads', () => {
   expect(detail_text({ arguments: { mode: 'auto', setpoint_m: 0.1 } }, true)).toBe(
     'arguments mode auto, setpoint m 0.1',
   );
+  expect(detail_text({ arguments: {}, kind: 'renew_lease' }, true)).toBe('kind renew_lease');
   expect(detail_text(undefined, true)).toBe('');
 });

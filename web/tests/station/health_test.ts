@@ -143,6 +143,25 @@ test('the disk: its state by the station, and how long it lasts by the pace', ()
   expect(word('log', recording({ wal_held_s: 11 }))).toBe('caution');
 });
 
+test('the room left is what max_database_mb or the disk leaves, whichever is less', () => {
+  const { retention } = kRecording;
+  const limited = (max_database_bytes: number, change: Partial<Recording> = {}) =>
+    line('disk', recording({ database_bytes: 10e9, retention: { ...retention, max_database_bytes }, ...change }));
+  expect(limited(21.4e9)).toMatchObject({
+    word: 'good',
+    value: '74.0 GB; the database may grow by 11.4 GB, enough for about 9 days',
+    note: 'Near 21.4 GB its oldest samples outside runs are removed.',
+  });
+  expect(limited(200e9).value).toBe('74.0 GB, enough for about 64 days'); // the disk is full before
+  expect(limited(9e9).value).toBe('74.0 GB; the database may grow by 0 B');
+  expect(limited(21.4e9, { space: 'low' }).word).toBe('caution');
+  const all_held = { ...retention, max_database_bytes: 9e9, all_held: true };
+  expect(line('disk', recording({ database_bytes: 10e9, retention: all_held }))).toMatchObject({
+    word: 'caution',
+    value: '74.0 GB, enough for about 64 days',
+  });
+});
+
 test('a certificate is judged by its last day, and plain TCP beyond this machine is bad', () => {
   const with_days = (days: number): Partial<HealthInput> => ({
     station: {

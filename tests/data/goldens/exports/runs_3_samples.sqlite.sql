@@ -561,7 +561,7 @@ INSERT INTO about VALUES('outside_reference','clock_method','how its clock was a
 INSERT INTO about VALUES('outside_reference','clock_offset_s','its time plus this is seconds since the first sample of the span');
 INSERT INTO about VALUES('outside_reference','clock_sd_s','standard deviation of clock_offset_s; NULL: not known');
 INSERT INTO about VALUES('outside_reference','correlation','correlation of both motions; NULL: another method');
-INSERT INTO about VALUES('outside_reference','motion_ratio','its motion is so many times the robot''s own record; NULL: another method');
+INSERT INTO about VALUES('outside_reference','motion_ratio','its motion divided by the robot''s own record of it; NULL: another method');
 INSERT INTO about VALUES('outside_reference','zero_is_kept','0: zero_offset_m was estimated from the robot''s own record');
 INSERT INTO about VALUES('outside_reference','zero_offset_m','was added to its positions');
 INSERT INTO about VALUES('outside_reference','zero_sd_m','standard deviation of zero_offset_m; NULL: not known');

@@ -72,15 +72,20 @@ function is_even(rows: readonly Pick<StoredSample, 'robot_time_us'>[]): boolean 
   return rows.every((row, at) => at === 0 || row.robot_time_us - rows[at - 1]!.robot_time_us === period_us);
 }
 
-// All samples of the run's first span.
-export async function samples_of(api: Pick<DesignApi, 'samples'>, run_id: number): Promise<StoredSample[]> {
+// All samples of some of the run's spans: a model is fitted to the first one.
+export async function samples_of(
+  api: Pick<DesignApi, 'samples'>,
+  run_id: number,
+  spans: readonly number[] = [0],
+): Promise<StoredSample[]> {
   const found: StoredSample[] = [];
+  const last = Math.max(...spans);
   let after: string | null = null;
   for (let page = 0; page < kPages; ++page) {
     const answer = await api.samples(run_id, after);
-    found.push(...answer.samples.filter(({ span }) => span === 0));
+    found.push(...answer.samples.filter(({ span }) => spans.includes(span)));
     after = answer.next;
-    if (after === null) break;
+    if (after === null || (answer.samples.at(-1)?.span ?? 0) > last) break; // they come in the order of the spans
   }
   return found;
 }

@@ -39,7 +39,7 @@ export function FitPlot({ session, work, design, fit, at }: FitPlotProps) {
 
 function Traces({ traces, run_id }: { traces: FitTraces; run_id: number | null }) {
   const hosts = [useRef<HTMLDivElement>(null), useRef<HTMLDivElement>(null)];
-  const plots = useRef<RunPlot[]>([]);
+  const plots = useRef<(RunPlot | null)[]>([]); // null: nothing to be drawn there
   const whole: [number, number] = [traces.time_s[0] ?? 0, traces.time_s.at(-1) ?? 1];
   const view = useSignal<[number, number]>([whole[0], Math.min(whole[1], whole[0] + kFirst_s)]);
   const cursor = useSignal<number | null>(null);
@@ -58,13 +58,13 @@ function Traces({ traces, run_id }: { traces: FitTraces; run_id: number | null }
       on_cursor: (time_s) => (cursor.value = time_s),
     });
     const least = 0.02 / factor;
-    plots.current = hosts.map((host, at) => new RunPlot(host.current!, options(at === 1, least)));
+    plots.current = hosts.map((host, at) => host.current && new RunPlot(host.current, options(at === 1, least)));
     const theme = matchMedia('(prefers-color-scheme: light)');
-    const restyle = () => plots.current.forEach((plot) => plot.restyle());
+    const restyle = () => plots.current.forEach((plot) => plot?.restyle());
     theme.addEventListener('change', restyle);
     return () => {
       theme.removeEventListener('change', restyle);
-      for (const plot of plots.current) plot.destroy();
+      for (const plot of plots.current) plot?.destroy();
       plots.current = [];
     };
   }, [traces]);
@@ -100,18 +100,28 @@ function Traces({ traces, run_id }: { traces: FitTraces; run_id: number | null }
       <figure>
         <figcaption>
           <b>{title}</b> <span class="unit">{unit}</span>
-          <span class="design-key measured">recorded</span>
-          <span class="design-key model">model</span>
-          <output>
-            {row < 0 ? '' : `${since_text(traces.time_s[row]!)}: ${at(traces.measured)}, model ${at(traces.model)}`}
-          </output>
+          {traces.measured && (
+            <>
+              <span class="design-key measured">recorded</span>
+              <span class="design-key model">model</span>
+              <output>
+                {row < 0 ? '' : `${since_text(traces.time_s[row]!)}: ${at(traces.measured)}, model ${at(traces.model)}`}
+              </output>
+            </>
+          )}
           <span class="design-fit-view">
             <button type="button" class="design-small" disabled={is_whole} onClick={() => (view.value = whole)}>
               Whole run
             </button>
           </span>
         </figcaption>
-        <div class="design-fit-data" ref={hosts[0]!} />
+        {traces.measured ? (
+          <div class="design-fit-data" ref={hosts[0]!} />
+        ) : (
+          <p class="quiet">
+            Recorded values cannot be laid beside the residuals here: those are not of the robot’s own ticks.
+          </p>
+        )}
       </figure>
       <figure>
         <figcaption>
@@ -120,11 +130,6 @@ function Traces({ traces, run_id }: { traces: FitTraces; run_id: number | null }
         </figcaption>
         <div class="design-fit-rest" ref={hosts[1]!} />
       </figure>
-      {!traces.measured && (
-        <p class="quiet">
-          Recorded values cannot be laid beside the residuals here: those are not of the robot’s own ticks.
-        </p>
-      )}
     </div>
   );
 }

@@ -132,7 +132,7 @@ function Qualities({ fit }: { fit: Identified }) {
         ))}
         {fit.validation && (
           <Row
-            name={`tried on run ${fit.validation.run_id}, not fitted`}
+            name={`validated on run ${fit.validation.run_id}, not fitted`}
             quality={fit.validation}
             id="design-validated"
           />

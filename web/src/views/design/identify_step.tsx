@@ -157,12 +157,12 @@ function Options({ design, runs }: StepProps) {
         on_value={(limit_s) => change_design({ ...design, limit_s: limit_s ?? kLimit.usual, fit: null })}
       />
       <div>
-        <span class="design-label">Tried on</span>
+        <span class="design-label">Validate on</span>
         <Choice
           id="design-validation"
-          label="Tried on another run"
+          label="Validate on another run"
           options={[
-            { value: '', text: 'nothing else' },
+            { value: '', text: 'no other run' },
             ...rest.map((id) => ({ value: String(id), text: `the rest of run ${id}` })),
             ...others.map(({ run_id, name }) => ({ value: String(run_id), text: `run ${run_id}: ${name}` })),
           ]}

@@ -296,7 +296,7 @@ function Send({ session, work, design, acts, is_auto, on_ask }: SendProps) {
         {blocked ||
           (is_auto
             ? `${robot_id} is in auto: what is sent moves it 1 s later.`
-            : `${robot_id} keeps it until it is switched off, and moves only when it is told to.`)}
+            : `${robot_id} keeps it until it is switched off, and moves only on a command.`)}
       </p>
     </div>
   );

@@ -110,7 +110,7 @@ function Row(props: { run: Run; is_in: boolean; is_full: boolean; on_choose(is_i
         <a href={format({ view: 'runs', parts: [String(run.run_id)] })}>#{run.run_id}</a>
       </td>
       <td class="name">{run.name}</td>
-      <td>{run.robot_id}</td>
+      <td class="robot">{run.robot_id}</td>
       <td class="less">{run.fluid ? fluid_text(run.fluid) : '–'}</td>
       <td class="number">{is_open ? 'open' : length_text(run)}</td>
       <td class="less">{date_and_time(run.started_at_us / 1000)}</td>

@@ -49,6 +49,11 @@ interface Compared {
   predicted: Measures;
 }
 
+// In which spans of the run the steps are; each boot of the robot has one.
+export const spans_of = (compared: readonly { step: Pick<StepMeasures, 'span'> }[]): number[] => [
+  ...new Set(compared.map(({ step }) => step.span)),
+];
+
 interface VerifyPlotsProps extends Pick<StepProps, 'session' | 'work'> {
   run_id: number;
   tuned: Tuned;
@@ -57,8 +62,14 @@ interface VerifyPlotsProps extends Pick<StepProps, 'session' | 'work'> {
 
 export function VerifyPlots({ session, work, run_id, tuned, compared }: VerifyPlotsProps) {
   const curve = useMemo(() => curves_of(tuned)[0], [tuned]);
-  const asked = useAsked(session, async () => ({ run_id, samples: await samples_of(work.api, run_id) }), [run_id]);
-  const samples = asked.answer?.run_id === run_id ? asked.answer.samples : null;
+  const spans = spans_of(compared);
+  const of = `${run_id} ${spans.join()}`;
+  const asked = useAsked(
+    session,
+    async () => ({ of, samples: spans.length === 0 ? [] : await samples_of(work.api, run_id, spans) }),
+    [of],
+  );
+  const samples = asked.answer?.of === of ? asked.answer.samples : null;
   if (!curve || compared.length === 0) return null;
   if (asked.problem !== '') return <p class="problem">{asked.problem}</p>;
   if (!samples) return <p class="quiet design-plot-wait">The samples of the run are being read…</p>;

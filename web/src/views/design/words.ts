@@ -76,7 +76,7 @@ export function sentences_of(fit: Identified): string[] {
     said.push(
       fit.residuals_are_white
         ? 'What is left over looks like noise alone, so the ± can be believed.'
-        : 'What is left over is not noise alone: the true errors are larger than the ± below.',
+        : 'What is left over is not noise alone: the true errors are larger than the ± of the parameters.',
     );
   const unknown = kParameters.filter((name) => (fit.one_sigma[name] ?? 0) > kRoughly * Math.abs(fit.parameters[name]));
   if (unknown.length > 0)

@@ -4,8 +4,8 @@ import type { ExperimentSummary } from '../../experiments_store';
 import { duration, words } from '../../format';
 
 export const kStates: Record<ExperimentSummary['state'], string> = {
-  waiting: 'Waits',
-  running: 'Runs',
+  waiting: 'Waiting',
+  running: 'Running',
   paused: 'Paused',
   aborting: 'Coming to rest',
   done: 'Done',

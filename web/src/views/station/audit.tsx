@@ -52,7 +52,7 @@ function Entries({ context }: { context: Context }) {
             on_choose={(chosen) => change_query({ action: chosen })}
           />
         </div>
-        <Filter name="actor" label="Who, as a whole" hint="user:anna/session:4" value={actor} />
+        <Filter name="actor" label="Who, in full" hint="user:anna/session:4" value={actor} />
         <Filter name="robot" label="Robot" hint="any" value={robot} />
         {is_filtered && (
           <button
@@ -68,7 +68,7 @@ function Entries({ context }: { context: Context }) {
       {entries.length === 0 ? (
         <Nothing is_known={list.is_known.value && !list.is_busy.value}>
           <p>{is_filtered ? 'No entry is like that.' : 'No entry yet.'}</p>
-          {is_filtered && <p class="quiet">Who must be written as a whole: press a name in the list to take it.</p>}
+          {is_filtered && <p class="quiet">Write in full who it was: a press on a name in the list fills it in.</p>}
         </Nothing>
       ) : (
         <Table entries={entries} context={context} />

@@ -110,6 +110,7 @@ export function detail_text(detail: unknown, is_utc: boolean): string {
   return Object.entries(detail as Record<string, unknown>)
     .filter(([, value]) => value !== null && value !== '')
     .map(([name, value]) => member_text(name, value, is_utc))
+    .filter((text) => text !== '')
     .join(', ');
 }
 
@@ -118,6 +119,7 @@ const kFirstDay_us = 1e15; // 2001: what is less is a length of time
 function member_text(name: string, value: unknown, is_utc: boolean): string {
   if (name.endsWith('_us') && typeof value === 'number' && value > kFirstDay_us)
     return `${name.slice(0, -3).replaceAll('_', ' ')} ${moment_text(value, is_utc)}`;
+  // A member that has nothing in it says nothing.
   const text = typeof value === 'object' ? detail_text(value, is_utc) : String(value as string | number | boolean);
-  return `${name.replaceAll('_', ' ')} ${text}`;
+  return text === '' ? '' : `${name.replaceAll('_', ' ')} ${text}`;
 }

@@ -21,7 +21,7 @@ export function Configuration({ context }: { context: Context }) {
         </p>
       </Panel>
       {facts && retention && (
-        <Panel id="station-settings" title="What else the station says">
+        <Panel id="station-settings" title="What else the station reports">
           <dl class="facts">
             <Fact name="http">{facts.station.http_address}</Fact>
             <Fact name="robots">{facts.station.robots_address}</Fact>

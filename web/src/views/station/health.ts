@@ -6,7 +6,7 @@ import type { Recording, Station } from '../../api';
 import { bytes, count, milliseconds } from '../../format';
 import type { Metrics } from './metrics';
 import { exact_text, span_text } from './moments';
-import { full_in_s, type Pace } from './pace';
+import { full_in_s, is_within_disk, type Pace } from './pace';
 
 export type Word = 'good' | 'caution' | 'bad' | 'unknown';
 
@@ -113,7 +113,7 @@ function queue_line({ queued_samples }: Recording, fleet: Fleet): Line {
 
 function writes_line({ counters }: Recording, pace: Pace | null, fleet: Fleet): Line {
   const { commits_failed } = counters;
-  if (!pace) return line('unknown', '', 'Measured for the first seconds that this page is open.');
+  if (!pace) return line('unknown', '', 'It is known a few seconds after the page was opened.');
   const value = `${count(pace.samples_per_s)} samples/s, ${(pace.commits / pace.over_s).toFixed(1)} commits/s`;
   if (pace.commits === 0 && fleet.samples_per_s > 0)
     return line('bad', value, `No write for ${span_text(pace.over_s)}, while robots send. The station’s log says why.`);
@@ -154,12 +154,29 @@ function records_line({ counters }: Recording): Line {
   return line('good', 'all recorded', 'None was refused since the start.');
 }
 
-function disk_line({ space, free_bytes, problem }: Recording, pace: Pace | null): Line {
-  const full_s = pace && full_in_s(pace, free_bytes);
-  const value = `${bytes(free_bytes)}${full_s ? `, enough for about ${span_text(full_s)}` : ''}`;
+function disk_line(recording: Recording, pace: Pace | null): Line {
+  const { space, free_bytes, database_bytes, retention, problem } = recording;
+  const is_limited = is_within_disk(recording); // max_database_mb is reached before the disk is full
+  const room_bytes = is_limited ? Math.max(0, retention.max_database_bytes - database_bytes) : free_bytes;
+  const full_s = pace && full_in_s(pace, room_bytes);
+  const how_long = full_s ? `, enough for about ${span_text(full_s)}` : '';
+  const of_database = is_limited ? `; the database may grow by ${bytes(room_bytes)}` : '';
+  const value = `${bytes(free_bytes)}${of_database}${how_long}`;
   if (space === 'critical')
     return line('bad', value, problem ?? 'No run and no backup can be begun. Make room on the database’s disk.');
   if (space === 'low') return line('caution', value, problem ?? 'Make room on the database’s disk.');
+  if (retention.all_held)
+    return line(
+      'caution',
+      value,
+      `Runs alone use more than max_database_mb allows (${bytes(retention.max_database_bytes)}): discard runs, or raise it.`,
+    );
+  if (is_limited)
+    return line(
+      'good',
+      value,
+      `Near ${bytes(retention.max_database_bytes)} its oldest samples outside runs are removed.`,
+    );
   return line('good', value, 'On the disk of the database.');
 }
 

@@ -10,6 +10,7 @@ import { Pages, type PageWays } from './pages';
 import { readout_at } from './past_readout';
 import { Player } from './player';
 import { Reel, type Row, type Situation } from './reel';
+import { Spreads } from './spreads';
 
 const kReadout_ms = 100; // between two readings while it plays
 const kShownLines = 60;
@@ -40,6 +41,7 @@ export class Replay {
   readonly length_s = signal(0);
   shown_s = 60; // how much the plots show
   on_change: () => void = () => undefined; // the moment, or what is known of it, is another one
+  private readonly spreads: Spreads;
   private all_lines: readonly LogLine[] = []; // the oldest first
   private read_at_ms = -Infinity;
   private pending_step: 1 | -1 | null = null;
@@ -51,6 +53,7 @@ export class Replay {
   ) {
     this.reel = new Reel(extent.first_us, extent.period_us);
     this.pages = new Pages(this.reel, ways, () => this.on_page());
+    this.spreads = new Spreads(this.reel, ways, () => this.tell_lines());
     this.player = new Player((at_s) => this.seconds_of(this.pages.ready_to_us(this.utc_of(at_s))));
     this.extend(extent);
   }
@@ -127,6 +130,7 @@ export class Replay {
 
   close(): void {
     this.pages.close();
+    this.spreads.close();
     this.player.pause();
   }
 
@@ -176,10 +180,8 @@ export class Replay {
     const now_ms = this.at_us.peek() / 1000;
     let end = this.all_lines.length;
     while (end > 0 && (this.all_lines[end - 1] as LogLine).at_ms > now_ms) --end;
-    const shown = this.all_lines
-      .slice(Math.max(0, end - kShownLines), end)
-      .reverse()
-      .map((line) => line_at(line, this.at_us.peek()));
+    const had_happened = this.all_lines.slice(Math.max(0, end - kShownLines), end).reverse();
+    const shown = this.spreads.of(had_happened).map((line) => line_at(line, this.at_us.peek()));
     const before = this.lines.peek();
     if (shown.length !== before.length || !shown.every((line, at) => is_same(line, before[at])))
       this.lines.value = shown;
@@ -190,7 +192,8 @@ const is_same = (a: LogLine, b: LogLine | undefined) =>
   a.key === b?.key &&
   a.at_ms === b.at_ms &&
   a.command?.state === b.command?.state &&
-  a.command?.further_renewals === b.command?.further_renewals;
+  a.command?.further_renewals === b.command?.further_renewals &&
+  a.position_sd_m === b.position_sd_m;
 
 // A command as it stood at a moment: what became of it later is not known then.
 export function line_at(line: LogLine, utc_us: number): LogLine {
@@ -235,7 +238,7 @@ export function lines_of(
     event: null,
     command: null,
     note: null,
-    position_sd_m: null,
+    position_sd_m: undefined,
     ...what,
   });
   const of_events = events.map((event) => {

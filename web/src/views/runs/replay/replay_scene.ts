@@ -6,7 +6,8 @@ import { PredictionLoader } from '../../../plots/prediction_loader';
 import { Scene } from '../../../plots/scene';
 import type { PlotSettings } from '../../../plots/strips';
 import { TimeAxis } from '../../../plots/time_axis';
-import type { Replay } from './replay';
+import type { LogLine } from '../../../store';
+import { line_at, type Replay } from './replay';
 
 const kLeastShown_s = 1;
 const kLongestShown_s = 86_400;
@@ -38,6 +39,7 @@ export class ReplayScene extends Scene {
       shift_s: () => 0,
       edge_s: () => replay.at_us.peek() / 1e6,
       is_still: () => !player.is_playing.peek(),
+      known: (line: LogLine) => line_at(line, replay.at_us.peek()),
     };
     const length_s = Math.max(kLeastShown_s, replay.length_s.peek());
     const axis = new TimeAxis(Math.min(settings.kept.peek().span_s, round_span_s(length_s)));

@@ -52,7 +52,7 @@ export function ReplayView({ session, page, route }: Props) {
             </a>
           </div>
         ) : (
-          <p class="quiet">Run {page.run_id} is being read…</p>
+          <p class="quiet replay-reading">Run {page.run_id} is being read…</p>
         )}
       </Frame>
     );
