@@ -89,7 +89,8 @@ void ApiServer::add_routes(boost::asio::io_context& loop, station::Station& stat
   add_command_routes(router_, {clock_, history, station});
   add_in_force_routes(router_, {station});
   add_fluid_routes(router_, {clock_, recording.fluid_models, recording.recorder, station});
-  add_run_routes(router_, {analysis, recording.digester, clock_, recording.disk_watch, live, recording.runs, station});
+  add_run_routes(router_, {analysis, recording.digester, recording.finalizer, clock_, recording.disk_watch, live,
+                           recording.runs, station});
   add_run_metrics_routes(router_, {documents_});
   add_comparison_routes(router_, {documents_});
   const analysis::ExportParts job_exports{recording.exports, recording.disk_watch, recording.job_files,
@@ -107,7 +108,7 @@ void ApiServer::add_routes(boost::asio::io_context& loop, station::Station& stat
   add_sample_routes(router_, {history});
   add_overview_routes(router_, {history});
   add_export_routes(router_, exports);
-  add_account_routes(router_, {accounts_, auth_, logins_, clock_, station, facts_});
+  add_account_routes(router_, {accounts_, auth_, logins_, recording.finalizer, clock_, station, facts_});
   add_experiment_routes(router_, {clock_, experiments, station});
   connect_controllers(experiments, {analysis, recording.designs, station});
   connect_fits(experiments, {clock_, analysis, recording.jobs});

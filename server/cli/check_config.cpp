@@ -21,6 +21,9 @@ void print_recording(const config::RecordingConfig& recording, std::ostream& out
              or_none(recording.event_retention_days, "days", "for ever"),
              or_none(recording.max_database_mb, "MB", "without limit"), recording.low_space_mb,
              recording.critical_space_mb);
+  fmt::print(out, "give up  samples of robots that do not come back: {}\n",
+             recording.give_up_after_days == 0 ? "only when an admin says so"
+                                               : fmt::format("after {} days", recording.give_up_after_days));
 }
 
 // What keeps others from reading and changing what is sent.
@@ -56,6 +59,7 @@ nlohmann::ordered_json json_of(const config::Config& config) {
           {"recording",
            {{"retention_days", recording.retention_days},
             {"event_retention_days", recording.event_retention_days},
+            {"give_up_after_days", recording.give_up_after_days},
             {"max_database_mb", recording.max_database_mb},
             {"low_space_mb", recording.low_space_mb},
             {"critical_space_mb", recording.critical_space_mb}}},

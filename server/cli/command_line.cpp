@@ -62,7 +62,7 @@ const std::vector<std::pair<const char*, std::vector<std::string_view>>> kGroups
     {"Robots", {"stop", "watch", "robot", "fluid"}},
     {"Experiments", {"profile", "experiment", "autotune"}},
     {"Recordings",
-     {"export", "reference", "metrics", "compare", "impedance-map", "report", "capsule", "reproduce", "job"}},
+     {"export", "run", "reference", "metrics", "compare", "impedance-map", "report", "capsule", "reproduce", "job"}},
     {"Models and controllers",
      {"model", "bode", "step", "identify", "estimator", "tune", "discretise", "predict", "design"}},
     {"Accounts", {"login-link", "user", "token"}},
@@ -157,6 +157,7 @@ void define_command_line(CLI::App& app, CommandLine& line) {
   offer<Tune>(app, "tune", "Find the controller for a crossover and a phase margin", line);
   offer<Discretise>(app, "discretise", "Turn the controller into coefficients for the robot", line);
   offer<Export>(app, "export", "Write a recorded run as a file: CSV, MAT, SQLite or MCAP", line);
+  offer<RunCommand>(app, "run", "Make a run final whose robot does not come back", line);
   offer<ReferenceCommand>(app, "reference", "A run's position as it was measured from outside: import, show, remove",
                           line);
   offer<Predict>(app, "predict", "Predict a closed-loop experiment, beside a recorded one", line);

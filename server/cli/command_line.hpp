@@ -22,6 +22,7 @@
 #include "server/cli/data/reference.hpp"
 #include "server/cli/data/reproduce.hpp"
 #include "server/cli/data/restore.hpp"
+#include "server/cli/data/run.hpp"
 #include "server/cli/data/verify.hpp"
 #include "server/cli/design/bode.hpp"
 #include "server/cli/design/discretise.hpp"
@@ -64,9 +65,9 @@ using CommandLine =
     std::variant<Answered, Serve, CheckConfig, Certificate, Backup, Restore, Verify, Export, Model, Bode, Step,
                  Identify, EstimatorQuestion, Tune, Discretise, Predict, UserCommand, TokenCommand, RobotCommand,
                  FluidCommand, JobCommand, DesignCommand, MetricsQuestion, CompareQuestion, ImpedanceMapQuestion,
-                 ReportQuestion, CapsuleQuestion, Reproduce, ReferenceCommand, ProfileQuestion, ExperimentCommand,
-                 Autotune, Demo, StopCommand, WatchCommand, Doctor, SupportBundle, Commission, LoginLink,
-                 CompletionCommand, ManualCommand>;
+                 ReportQuestion, CapsuleQuestion, Reproduce, RunCommand, ReferenceCommand, ProfileQuestion,
+                 ExperimentCommand, Autotune, Demo, StopCommand, WatchCommand, Doctor, SupportBundle, Commission,
+                 LoginLink, CompletionCommand, ManualCommand>;
 
 // The program with all its commands; the one that is chosen when `app` parses becomes `line`.
 void define_command_line(CLI::App& app, CommandLine& line);

@@ -93,7 +93,8 @@ struct RunRequest {
 Result<RunRequest> parse_run(const std::string& body);
 Result<std::string> parse_run_end(const std::string& body);  // the verdict; an empty body has none
 Result<storage::RunAnnotation> parse_annotation(const std::string& body);
-Result<std::string> parse_discard(const std::string& body);  // the reason
+Result<std::string> parse_discard(const std::string& body);     // the reason
+Result<std::uint64_t> parse_finalize(const std::string& body);  // how many samples are missing
 struct MarkerBody {
   std::string text;
   std::optional<std::int64_t> at_us;

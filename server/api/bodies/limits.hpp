@@ -122,6 +122,7 @@ inline constexpr Limit<std::int64_t> kIntegerLimits[] = {
     {"IssuedAtUs", {0, kMaxTimeUs}},
     {"LifeMs", {1, protocol::kMaxTimeToLiveUs / 1000}},
     {"MarkerBody.at_us", {0, kMaxTimeUs - 1}},
+    {"RunFinalizeBody.samples_missing", {0, kMaxJavaScriptInteger}},
     {"PushControllerBody.design_id", {1, kMaxJavaScriptInteger}},
     {"PushControllerBody.life_ms", {1, protocol::kMaxTimeToLiveUs / 1000}},
     {"ReferenceBody.span", {0, 1'000'000}},

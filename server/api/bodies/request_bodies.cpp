@@ -171,6 +171,14 @@ Result<std::string> parse_discard(const std::string& text) {
   return body->text("reason", text_bytes("RunDiscardBody.reason"));
 }
 
+Result<std::uint64_t> parse_finalize(const std::string& text) {
+  const auto body = Members::parse(text, {"samples_missing"});
+  if (!body) return std::unexpected{body.error()};
+  const auto samples = body->integer("samples_missing", integers("RunFinalizeBody.samples_missing"));
+  if (!samples) return std::unexpected{samples.error()};
+  return static_cast<std::uint64_t>(*samples);
+}
+
 Result<MarkerBody> parse_marker(const std::string& text) {
   const auto body = Members::parse(text, {"text", "at_us"});
   if (!body) return std::unexpected{body.error()};

@@ -139,6 +139,10 @@ std::string metrics_text(const RecordingRoutes& parts) {
   metrics.counter("samples_duplicate_total", counters.samples_duplicate, "Samples that were received again.");
   metrics.counter("samples_refused_total", counters.samples_refused, "Samples that the full queue did not take.");
   metrics.counter("samples_lost_total", counters.samples_lost, "Samples in gaps that were noted.");
+  metrics.counter("samples_given_up_total", counters.samples_given_up,
+                  "Of those, samples whose robot did not come back.");
+  metrics.counter("samples_returned_total", counters.samples_returned,
+                  "Samples that were given up, and with which their robot came back.");
   metrics.counter("samples_purged_total", retention.samples_purged, "Samples that retention removed.");
   metrics.counter("events_purged_total", retention.events_purged, "Events that retention removed.");
   metrics.counter("records_refused_total", counters.records_refused, "Events and commands not recorded.");

@@ -59,6 +59,7 @@ class OutsideReferences;
 class Recorder;
 class ReservationBook;
 class RunDigester;
+class RunFinalizer;
 class Runs;
 struct ExportSlots;
 struct OutsideReference;
@@ -84,6 +85,7 @@ struct AccountRoutes {
   identity::Accounts& accounts;
   identity::Auth& auth;
   identity::Logins& logins;
+  storage::RunFinalizer& finalizer;
   runtime::Clock& clock;
   station::Station& station;
   const StationFacts& facts;
@@ -179,6 +181,7 @@ void add_robot_routes(http::Router& router, RobotRoutes parts);
 struct RunRoutes {
   analysis::AnalysisService& analysis;
   storage::RunDigester& digester;
+  storage::RunFinalizer& finalizer;
   runtime::Clock& clock;
   storage::DiskWatch& disk_watch;
   live::LiveFeed& live;

@@ -8,6 +8,7 @@
 #include "server/identity/auth.hpp"
 #include "server/identity/logins.hpp"
 #include "server/station/station.hpp"
+#include "server/storage/finalizing/run_finalizer.hpp"
 
 namespace server::api {
 using nlohmann::json;
@@ -218,7 +219,10 @@ http::Answer revoke_robot(AccountRoutes parts, http::Request request) {
   parts.station.end_connection(robot_id, "its enrolment was revoked");
   const auto revoked = co_await parts.accounts.revoke_robot(robot_id, author_of(request, parts.clock));
   if (!revoked) co_return http::problem(revoked.error());
-  co_return http::json_response(200, to_json(*revoked));
+  const auto given_up = co_await parts.finalizer.give_up_revoked(robot_id, author_of(request, parts.clock));
+  json answer = to_json(*revoked);
+  answer["samples_given_up"] = given_up ? json(*given_up) : json(nullptr);  // null: as soon as it can be done
+  co_return http::json_response(200, answer);
 }
 
 // SAFETY: what takes a robot out of the stop of all is stored before it is in force; what brings it back is in force at

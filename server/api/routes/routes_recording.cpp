@@ -18,6 +18,8 @@ json to_json(const storage::RecorderCounters& counters) {
           {"samples_duplicate", counters.samples_duplicate},
           {"samples_refused", counters.samples_refused},
           {"samples_lost", counters.samples_lost},
+          {"samples_given_up", counters.samples_given_up},
+          {"samples_returned", counters.samples_returned},
           {"records_refused", counters.records_refused},
           {"batches_malformed", counters.batches_malformed},
           {"events_asked_again", counters.events_asked_again},

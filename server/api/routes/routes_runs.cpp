@@ -1,4 +1,4 @@
-// Runs: begin, end, make afterwards, annotate, discard, list, digest, measure.
+// Runs: begin, end, make afterwards, annotate, discard, make final, list, digest, measure.
 #include <fmt/format.h>
 
 #include "server/analysis/analysis_service.hpp"
@@ -10,6 +10,7 @@
 #include "server/identity/auth.hpp"
 #include "server/live/live_feed.hpp"
 #include "server/station/station.hpp"
+#include "server/storage/finalizing/run_finalizer.hpp"
 #include "server/storage/runs/run_digester.hpp"
 #include "server/storage/runs/runs.hpp"
 #include "server/storage/upkeep/disk_watch.hpp"
@@ -132,6 +133,22 @@ http::Answer discard_run(RunRoutes parts, http::Request request) {
   co_return http::json_response(200, api::to_json(*run));
 }
 
+http::Answer finalize_run(RunRoutes parts, http::Request request) {
+  const auto id = run_id_of(request);
+  if (!id) co_return http::problem(id.error());
+  const auto missing = parse_finalize(request.body);
+  if (!missing) co_return http::problem(missing.error());
+  const auto given_up = co_await parts.finalizer.finalize(*id, *missing, author_of(request, parts.clock));
+  if (!given_up) co_return http::problem(given_up.error());
+  const auto digest = co_await parts.digester.find(*id);
+  if (!digest) co_return http::problem(digest.error());
+  const auto run = co_await parts.runs.find(*id);
+  if (run) parts.live.publish_run(api::to_json(*run));
+  json answer = api::to_json(*digest, *id);
+  answer["samples_given_up"] = *given_up;
+  co_return http::json_response(200, answer);
+}
+
 http::Answer get_digest(RunRoutes parts, http::Request request) {
   const auto id = run_id_of(request);
   if (!id) co_return http::problem(id.error());
@@ -174,6 +191,7 @@ void add_run_routes(http::Router& router, RunRoutes parts) {
   add("POST", "/api/v1/runs/{run_id}/end", identity::Scope::record, {}, end_run);
   add("POST", "/api/v1/runs/{run_id}/annotate", identity::Scope::record, {}, annotate_run);
   add("POST", "/api/v1/runs/{run_id}/discard", identity::Scope::record, {}, discard_run);
+  add("POST", "/api/v1/runs/{run_id}/finalize", identity::Scope::admin, {}, finalize_run);
   add("GET", "/api/v1/runs/{run_id}/certificate", identity::Scope::read, {}, get_digest);
   add("GET", "/api/v1/runs/{run_id}/snapshot", identity::Scope::read, {}, get_snapshot);
   add("GET", "/api/v1/runs/{run_id}/step-metrics", identity::Scope::read, {}, get_step_metrics);

@@ -177,12 +177,14 @@ json AccountAccess::enrol(const std::string& robot_id) {
   return made;
 }
 
-void AccountAccess::revoke_robot(const std::string& robot_id) {
+std::optional<std::uint64_t> AccountAccess::revoke_robot(const std::string& robot_id) {
   if (station_) {
-    ask("POST", "/enrolments/" + robot_id + "/revoke");
-  } else {
-    value_of(store().revoke_robot(robot_id, command_line_author()));
+    const json answer = ask("POST", "/enrolments/" + robot_id + "/revoke");
+    const json given_up = answer.value("samples_given_up", json{});
+    return given_up.is_number() ? std::optional{given_up.get<std::uint64_t>()} : std::nullopt;
   }
+  value_of(store().revoke_robot(robot_id, command_line_author()));
+  return std::nullopt;
 }
 
 void AccountAccess::set_retired(const std::string& robot_id, bool retired) {

@@ -34,7 +34,8 @@ class AccountAccess {
 
   nlohmann::json enrolments();
   nlohmann::json enrol(const std::string& robot_id);  // with its "secret"
-  void revoke_robot(const std::string& robot_id);
+  // How many of its samples were given up; none: the station will do it.
+  std::optional<std::uint64_t> revoke_robot(const std::string& robot_id);
   void set_retired(const std::string& robot_id, bool retired);
 
  private:

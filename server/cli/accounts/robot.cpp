@@ -65,6 +65,22 @@ int enrol(const RobotCommand& options, std::ostream& out) {
   return 0;
 }
 
+int revoke(AccountAccess& accounts, const RobotCommand& options, std::ostream& out) {
+  const std::optional<std::uint64_t> given_up = accounts.revoke_robot(options.robot_id);
+  if (options.json) {
+    nlohmann::json answer{{"robot_id", options.robot_id}, {"result", "revoked"}, {"samples_given_up", nullptr}};
+    if (given_up) answer["samples_given_up"] = *given_up;
+    fmt::print(out, "{}\n", answer.dump(2));
+  } else if (given_up) {
+    fmt::print(out, "Robot {} was revoked; {} samples that it has not sent are given up\n", options.robot_id,
+               *given_up);
+  } else {
+    fmt::print(out, "Robot {} was revoked; samples that it has not sent are given up when the station runs\n",
+               options.robot_id);
+  }
+  return 0;
+}
+
 }  // namespace
 
 void add_options(CLI::App& command, RobotCommand& options) {
@@ -76,7 +92,8 @@ void add_options(CLI::App& command, RobotCommand& options) {
   enrol->footer("Example: rheonaut robot enrol rheo-1 --data lab");
   offer(command, options, RobotCommand::Act::list, "list", "List the robots that may or might connect");
   constexpr std::tuple<RobotCommand::Act, const char*, const char*> kOfOne[] = {
-      {RobotCommand::Act::revoke, "revoke", "Refuse a robot from now on, and end its connection"},
+      {RobotCommand::Act::revoke, "revoke",
+       "Refuse a robot from now on, end its connection, give up what it has not sent"},
       {RobotCommand::Act::retire, "retire", "Leave a robot out of the stop of all robots while it is not connected"},
       {RobotCommand::Act::unretire, "unretire", "Put a retired robot back into use"}};
   for (const auto& [act, name, purpose] : kOfOne) {
@@ -96,14 +113,9 @@ int run(const RobotCommand& options, std::ostream& out) {
   if (options.act == RobotCommand::Act::enrol) return enrol(options, out);
   AccountAccess accounts{options.data_dir, AccountAccess::Missing::refuse};
   if (options.act == RobotCommand::Act::list) return list_robots(accounts.enrolments(), options.json, out);
-  if (options.act == RobotCommand::Act::revoke) {
-    accounts.revoke_robot(options.robot_id);
-  } else {
-    accounts.set_retired(options.robot_id, options.act == RobotCommand::Act::retire);
-  }
-  const char* done = options.act == RobotCommand::Act::revoke   ? "revoked"
-                     : options.act == RobotCommand::Act::retire ? "retired"
-                                                                : "put back into use";
+  if (options.act == RobotCommand::Act::revoke) return revoke(accounts, options, out);
+  accounts.set_retired(options.robot_id, options.act == RobotCommand::Act::retire);
+  const char* done = options.act == RobotCommand::Act::retire ? "retired" : "put back into use";
   if (options.json) {
     fmt::print(out, "{}\n", nlohmann::json{{"robot_id", options.robot_id}, {"result", done}}.dump(2));
   } else {

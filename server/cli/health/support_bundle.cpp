@@ -110,6 +110,7 @@ std::string config_json(const config::Config& config) {
                    {"robots.samples_per_frame", config.link.samples_per_frame},
                    {"recording.retention_days", config.recording.retention_days},
                    {"recording.event_retention_days", config.recording.event_retention_days},
+                   {"recording.give_up_after_days", config.recording.give_up_after_days},
                    {"recording.max_database_mb", config.recording.max_database_mb},
                    {"recording.low_space_mb", config.recording.low_space_mb},
                    {"recording.critical_space_mb", config.recording.critical_space_mb},

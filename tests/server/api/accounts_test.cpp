@@ -135,7 +135,11 @@ TEST_F(AccountsTest, ARobotIsEnrolledRevokedAndEnrolledAgain) {
 
 TEST_F(AccountsTest, RevokingEndsTheConnectionAndKeepsTheRobotOut) {
   connect_robot();
-  ASSERT_EQ(ask("POST", "/api/v1/enrolments/r1/revoke").status, 200);
+  make_samples(*robot, 0, 10);
+  make_samples(*robot, 15, 5);  // 10 to 14 are missing
+  const Answered revoked = ask("POST", "/api/v1/enrolments/r1/revoke");
+  ASSERT_EQ(revoked.status, 200) << revoked.body;
+  EXPECT_EQ(revoked.parsed()["samples_given_up"], 5);
   ASSERT_TRUE(clock.run_until([&] { return robot->closed; }, 1s));
   EXPECT_EQ(ask("GET", "/api/v1/robots/r1").parsed()["link"], "disconnected");
   TestRobot back{loop, clock, tasks, robots};

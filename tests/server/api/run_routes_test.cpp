@@ -92,6 +92,34 @@ TEST_F(RunRoutesTest, ADiscardedRunIsListedOnlyByItsState) {
   EXPECT_EQ(ask("POST", "/api/v1/runs/1/discard", {{"reason", "again"}}).status, 409);
 }
 
+// Of samples 0 to 19, 10 to 14 were made and never came.
+TEST_F(RunRoutesTest, WhatIsMissingOfARunIsGivenUpOnAnAdminsWord) {
+  connect_robot();
+  ask("POST", "/api/v1/runs", {{"robot_id", "r1"}, {"name", "lost"}});
+  make_samples(*robot, 0, 10);
+  make_samples(*robot, 15, 5);
+  ASSERT_EQ(ask("POST", "/api/v1/runs/1/end").status, 200);
+  const char* path = "/api/v1/runs/1/finalize";
+  EXPECT_EQ(ask("POST", path).status, 400);
+  EXPECT_EQ(ask("POST", path, {{"samples_missing", -1}}).status, 422);
+  EXPECT_EQ(ask("POST", "/api/v1/runs/9/finalize", {{"samples_missing", 5}}).status, 404);
+  const Answered connected = ask("POST", path, {{"samples_missing", 5}});
+  EXPECT_EQ(connected.status, 409);
+  EXPECT_EQ(connected.parsed()["reason"], "robot_connected");
+  robot->link.cut();
+  ASSERT_TRUE(clock.run_until([&] { return station.find("r1")->link == station::LinkState::disconnected; }, 2s));
+  const Answered another = ask("POST", path, {{"samples_missing", 4}});
+  EXPECT_EQ(another.status, 409);
+  EXPECT_EQ(another.parsed()["reason"], "missing_changed");
+  EXPECT_EQ(ask("GET", "/api/v1/runs/1/certificate").parsed()["final"], false);
+  const Answered given_up = ask("POST", path, {{"samples_missing", 5}});
+  ASSERT_EQ(given_up.status, 200) << given_up.body;
+  EXPECT_EQ(given_up.parsed()["samples_given_up"], 5);
+  EXPECT_EQ(given_up.parsed()["final"], true);
+  EXPECT_EQ(given_up.parsed()["lost_by_cause"], (json{{"given_up", 5}}));
+  EXPECT_EQ(ask("GET", "/api/v1/audit?limit=1").parsed()["entries"][0]["action"], "run.finalized");
+}
+
 TEST_F(RunRoutesTest, MarkersAreListedByRobotAndByRun) {
   record();
   const Answered marked = ask("POST", "/api/v1/robots/r1/markers", {{"text", "glucose in"}});

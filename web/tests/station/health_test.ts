@@ -23,6 +23,8 @@ const kRecording: Recording = {
     samples_duplicate: 0,
     samples_refused: 0,
     samples_lost: 0,
+    samples_given_up: 0,
+    samples_returned: 0,
     records_refused: 0,
     batches_malformed: 0,
     events_asked_again: 0,

@@ -3,6 +3,7 @@
 import { useSignal } from '@preact/signals';
 import type { ComponentChildren } from 'preact';
 import { count, date_and_time, duration, fluid_text } from '../../format';
+import { GuardedButton } from '../../parts/hold_button';
 import { OutcomeLine, useAsking } from '../../parts/request';
 import type { Session } from '../../session';
 import type { RunPage } from './run_page';
@@ -20,10 +21,13 @@ interface RecordProps {
 export function Record({ session, api, page }: RecordProps) {
   const run = page.run.value;
   if (!run) return null;
-  const may_write = session.me.value?.scopes.split(',').includes('record') ?? false;
+  const scopes = session.me.value?.scopes.split(',') ?? [];
+  const may_write = scopes.includes('record');
+  const may_give_up = scopes.includes('admin');
   return (
     <div class="record">
       <Completeness run={run} certificate={page.certificate.value} />
+      {may_give_up && <GiveUp api={api} page={page} run={run} />}
       {may_write ? (
         <>
           <Said key={`said-${run.run_id}`} api={api} page={page} run={run} />
@@ -75,6 +79,35 @@ function Completeness({ run, certificate }: { run: Run; certificate: Certificate
         </p>
       )}
       {certificate && !certificate.final && <p class="quiet">The digest is made when no sample is missing any more.</p>}
+    </section>
+  );
+}
+
+// Of a run whose robot does not come back, for admins.
+export function GiveUp({ api, page, run }: { api: RunsApi; page: RunPage; run: Run }) {
+  const asking = useAsking();
+  const certificate = page.certificate.value;
+  const missing = certificate && !certificate.final ? certificate.samples_missing : 0;
+  if (run.state === 'discarded' || (missing === 0 && asking.outcome.value.phase === 'idle')) return null;
+  const give_up = async () => {
+    const finalized = async () => (page.certificate.value = await api.finalize(run.run_id, missing));
+    const is_done = await asking.ask('Giving up', finalized, kStation);
+    if (!is_done) page.certificate.value = await api.certificate(run.run_id); // another number may be missing now
+  };
+  return (
+    <section aria-label="Samples that are missing">
+      {missing > 0 && (
+        <>
+          <p class="quiet">
+            If {run.robot_id} does not come back: what is given up is lost for good, also if it does, and the run is
+            final.
+          </p>
+          <GuardedButton id="give-up" disabled={asking.pending} on_held={() => void give_up()}>
+            Hold to give up {count(missing)} samples
+          </GuardedButton>
+        </>
+      )}
+      <OutcomeLine asking={asking} id="give-up-outcome" />
     </section>
   );
 }

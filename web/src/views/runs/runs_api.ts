@@ -7,6 +7,7 @@ type Schemas = components['schemas'];
 export type Run = Schemas['Run'];
 export type RunState = Schemas['RunState'];
 export type Certificate = Schemas['Certificate'];
+export type FinalizedRun = Schemas['FinalizedRun'];
 export type Marker = Schemas['Marker'];
 export type Overview = Schemas['Overview'];
 export type RunMetrics = Schemas['RunMetrics'];
@@ -55,6 +56,10 @@ export function time_of(run: Run): { from_us: number; to_us?: number } {
 
 export class RunsApi {
   constructor(private readonly api: Pick<Api, 'read' | 'change'>) {}
+
+  // Gives up what is missing of it, if that is still so many samples.
+  finalize = (run_id: number, samples_missing: number) =>
+    this.api.change<FinalizedRun>(`/runs/${run_id}/finalize`, { samples_missing });
 
   page = async ({ robot_id, state, before, limit }: AskedRuns, signal?: AbortSignal): Promise<Run[]> =>
     (await this.api.read<{ runs: Run[] }>(`/runs?${query({ robot_id, state, before, limit })}`, signal)).runs;

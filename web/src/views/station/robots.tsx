@@ -114,7 +114,8 @@ function AllRobots({ context }: { context: Context }) {
         )}
         <p class="station-note">
           <b>Retired</b>: the stop of all robots leaves it out while it is not connected; its recording stays, and it
-          may connect. <b>Revoked</b>: the station refuses it, and its connection ends at once.
+          may connect. <b>Revoked</b>: the station refuses it, its connection ends at once, and what it has not sent of
+          its samples is given up for good.
         </p>
       </Panel>
     </div>
