@@ -5,6 +5,8 @@
 #include <cmath>
 #include <optional>
 
+#include "server/storage/samples/position_sd.hpp"
+
 namespace server::analysis {
 namespace {
 
@@ -109,7 +111,7 @@ class Cutter {
       time_s_.push_back(seconds(point));
       position_m_.push_back(static_cast<double>(point.position_m));
       step_.last_seq = point.seq;
-      step_.position_sd_m = std::max(step_.position_sd_m, static_cast<double>(point.position_sd_m));
+      step_.position_sd_m = storage::larger_sd_m(step_.position_sd_m, static_cast<double>(point.position_sd_m));
     }
     before_ = point;
   }
@@ -236,7 +238,7 @@ const char* text(StepCause value) { return value == StepCause::setpoint ? "setpo
 
 const char* position_source(const MeasuredStep& step) {
   if (step.is_from_outside) return "outside";
-  return step.position_sd_m > 0 ? "estimate" : "known";
+  return storage::is_estimate(step.position_sd_m) ? "estimate" : "known";
 }
 
 std::vector<MeasuredStep> measure_steps(const std::vector<StepPoint>& points,

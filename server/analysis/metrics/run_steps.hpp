@@ -28,7 +28,7 @@ struct StepPoint {
   float disturbance_m = 0;
   float setpoint_m = 0;
   bool steered = false;     // in auto mode with a setpoint
-  float position_sd_m = 0;  // of an estimated position; 0: known
+  float position_sd_m = 0;  // of an estimated position; 0: known; NaN: an estimate, not known how good
 };
 
 StepPoint step_point(const storage::StoredSample& stored);
@@ -54,7 +54,7 @@ struct MeasuredStep {
   double target_m = 0;
   double band_m = 0;
   double position_sd_m = 0;  // the largest in the step, start_m's and the zero's counted: every position in `metrics`
-                             // is uncertain by ± 2 of it
+                             // is uncertain by ± 2 of it; NaN where it is anywhere
   bool is_from_outside = false;  // positions, metrics and position_sd_m are those of the outside reference
   std::optional<EstimateError> estimate_error;  // then
   control::StepMetrics metrics;

@@ -29,11 +29,11 @@ void write_run(const json& metrics, std::ostream& out) {
   Table steps{{"step", "at (s)", "target (m)", "settling (s)", "overshoot (%)", "rise (s)", "error (m)", "± 2 sd (m)",
                "<position"}};
   for (const json& step : metrics.at("steps")) {
-    const double two_sd_m = step.at("position_sd_m").is_number() ? 2 * step.at("position_sd_m").get<double>() : 0;
+    const json& sd_m = step.at("position_sd_m");
     steps.row({step.at("cause"), number_text(step.at("at_s")), number_text(step.at("target_m")),
                number_text(step.at("settling_s")), number_text(step.at("overshoot_percent")),
-               number_text(step.at("rise_10_90_s")), number_text(step.at("steady_state_error_m")), cell(two_sd_m, 3),
-               step.at("position_source")});
+               number_text(step.at("rise_10_90_s")), number_text(step.at("steady_state_error_m")),
+               sd_m.is_number() ? cell(2 * sd_m.get<double>(), 3) : "not known", step.at("position_source")});
   }
   steps.write(out);
 }

@@ -18,6 +18,7 @@
 #include "server/analysis/control_json.hpp"
 #include "server/analysis/motion_at_start.hpp"
 #include "server/cli/terminal/options.hpp"
+#include "server/storage/samples/position_sd.hpp"
 
 namespace server::cli {
 namespace {
@@ -128,12 +129,10 @@ void take_off_disturbance(analysis::CsvColumns& columns) {
   }
 }
 
-double largest_of(const std::vector<double>& values) {
-  double largest = 0;
-  for (const double value : values) {
-    if (value > largest) largest = value;
-  }
-  return largest;
+double largest_sd_m(const std::vector<double>& values_m) {
+  double largest_m = 0;
+  for (const double value_m : values_m) largest_m = storage::larger_sd_m(largest_m, value_m);
+  return largest_m;
 }
 
 // Leaves the columns that are fitted.
@@ -142,11 +141,12 @@ std::string choose_channels(const std::string& file, analysis::CsvColumns& colum
     columns.erase("acceleration_m_s2");
     return "the file has no column position_sd_m: what it holds is taken as measured";
   }
-  const double position_sd_m = largest_of(columns[kPositionSd]);
-  if (position_sd_m > 0) {
+  const double position_sd_m = largest_sd_m(columns[kPositionSd]);
+  if (storage::is_estimate(position_sd_m)) {
     if (!columns.contains("acceleration_m_s2")) {
-      refuse(file,
-             fmt::format("{}; but there is no column acceleration_m_s2", analysis::channels_reason(position_sd_m)));
+      refuse(file, fmt::format("{}; but there is no column acceleration_m_s2. If the position was measured, delete the "
+                               "column position_sd_m",
+                               analysis::channels_reason(position_sd_m)));
     }
     columns.erase("position_m");
     columns.erase("velocity_m_s");

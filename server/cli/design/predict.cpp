@@ -6,11 +6,13 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <cmath>
 
 #include "server/analysis/control_json.hpp"
 #include "server/analysis/metrics/run_steps.hpp"
 #include "server/cli/design/robustness_table.hpp"
 #include "server/cli/terminal/options.hpp"
+#include "server/storage/samples/position_sd.hpp"
 
 namespace server::cli {
 namespace {
@@ -27,7 +29,7 @@ struct Measured {
 double largest_sd_m(std::span<const analysis::MeasuredStep> steps, bool is_from_outside) {
   double largest_m = 0;
   for (const analysis::MeasuredStep& step : steps) {
-    if (step.is_from_outside == is_from_outside) largest_m = std::max(largest_m, step.position_sd_m);
+    if (step.is_from_outside == is_from_outside) largest_m = storage::larger_sd_m(largest_m, step.position_sd_m);
   }
   return largest_m;
 }
@@ -36,9 +38,9 @@ double largest_sd_m(std::span<const analysis::MeasuredStep> steps, bool is_from_
 std::string source_in_words(std::span<const analysis::MeasuredStep> steps,
                             const std::optional<storage::StoredReference>& reference) {
   const double own_sd_m = largest_sd_m(steps, false);
-  const std::string own = own_sd_m > 0
-                              ? fmt::format("the robot's own estimate (position_sd_m is up to {:.2g} m)", own_sd_m)
-                              : std::string{"the position is known: position_sd_m is 0 throughout"};
+  const std::string sd = analysis::position_sd_in_words(own_sd_m);
+  const std::string own = storage::is_estimate(own_sd_m) ? fmt::format("the robot's own estimate ({})", sd)
+                                                         : "the position is known: " + sd;
   if (!reference) return own;
   const auto outside = std::ranges::count(steps, true, &analysis::MeasuredStep::is_from_outside);
   if (outside == 0) {
@@ -113,7 +115,9 @@ analysis::OrderedJson measured_step_json(const analysis::MeasuredStep& step) {
 // Of an estimated position with its ± 2 sd.
 void add_row(Table& table, const std::string& name, double at_s, const control::StepMetrics& m,
              double position_sd_m = 0) {
-  const std::string within = position_sd_m > 0 ? " ± " + fixed(2e3 * position_sd_m, 1) : "";
+  const std::string within = std::isnan(position_sd_m)             ? " ± not known"
+                             : storage::is_estimate(position_sd_m) ? " ± " + fixed(2e3 * position_sd_m, 1)
+                                                                   : "";
   table.row({name, cell(at_s, 5), m.settling_s ? cell(*m.settling_s, 4) : "never", fixed(m.overshoot_percent, 2),
              cell(m.rise_10_90_s, 4), fixed(1e3 * m.steady_state_error_m, 3) + within});
 }

@@ -54,6 +54,18 @@ TEST_F(RunStepsTest, SaysHowUncertainAnEstimatedPositionWas) {
   EXPECT_FLOAT_EQ(static_cast<float>(steps[1].position_sd_m), 0.002F);
 }
 
+TEST_F(RunStepsTest, OfAPositionWhoseUncertaintyIsNotKnownIsAnEstimate) {
+  steer(0.1F, 0, 100);
+  position_sd_m = std::numeric_limits<float>::quiet_NaN();
+  steer(0.1F, 0, 10);
+  position_sd_m = 0;
+  steer(0.1F, 0, 100);
+  const auto steps = measure_steps(points);
+  ASSERT_EQ(steps.size(), 1U);
+  EXPECT_STREQ(position_source(steps[0]), "estimate");
+  EXPECT_TRUE(std::isnan(steps[0].position_sd_m)) << "not the largest of those that are known";
+}
+
 TEST_F(RunStepsTest, MeasuresSetpointsAndDisturbances) {
   rest(50);
   steer(0.1F, 0, 1000);

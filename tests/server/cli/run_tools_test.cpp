@@ -65,7 +65,7 @@ class RunTools : public RecordingTest {
       const auto cell = [](float value) { return std::isfinite(value) ? fmt::format("{}", value) : std::string{}; };
       out << fmt::format("{},{},{},{},{},{},{}\n", stored.robot_time_us, cell(s.position_m), cell(s.velocity_m_s),
                          s.acceleration_m_s2, s.duty, station::or_nan(stored.disturbance_m),
-                         station::or_nan(stored.position_sd_m));
+                         cell(station::or_nan(stored.position_sd_m)));
     }
   }
 
@@ -136,6 +136,23 @@ TEST_F(RunTools, IdentifyFitsTheAccelerationWhereThePositionIsAnEstimate) {
   const ToolAnswer text = ask("identify --run 1 --structure second_order");
   EXPECT_THAT(text.text, AllOf(HasSubstr("fitted: acceleration_m_s2; position_m and velocity_m_s are the robot's own"),
                                HasSubstr("sensor: ")));
+}
+
+TEST_F(RunTools, AnUncertaintyThatIsNotKnownIsNotCertainty) {
+  const storage::RunId run = begin();
+  robot_.context.position_sd_m = std::nullopt;
+  for (const double duty : {0.0, 0.4, -0.5, 0.6, -0.6, 0.3}) swim_on_the_accelerometer(100, duty);
+  flush();
+  const auto [of_run, of_csv] = from_run_and_csv(run);
+  EXPECT_EQ(of_run, of_csv);
+  EXPECT_EQ(of_run["channels"], nlohmann::json{"acceleration_m_s2"});
+  EXPECT_THAT(of_run["channels_reason"].get<std::string>(), HasSubstr("estimates (position_sd_m is not known)"));
+}
+
+TEST_F(RunTools, ACsvWhosePositionIsNotKnownToBeKnownNeedsTheAcceleration) {
+  std::ofstream{folder_ / "run.csv"} << "t_s,duty,position_m,position_sd_m\n0,0,0,0\n0.01,0.3,0,\n0.02,0.3,0,0\n";
+  EXPECT_THAT(cli::ask_tool(folder_, "identify --csv @run.csv").error,
+              AllOf(HasSubstr("position_sd_m is not known"), HasSubstr("there is no column acceleration_m_s2")));
 }
 
 TEST_F(RunTools, IdentifySaysHowMuchDeadTimeTheSensorsReadingsMayHide) {
@@ -333,6 +350,18 @@ TEST_F(RunTools, PredictRepeatsTheRunsStepAndDisturbance) {
   EXPECT_NEAR(json["experiment"]["duration_s"], 4.99, 1e-6);
   EXPECT_EQ(json["measured_steps"].size(), 2u);
   EXPECT_THAT(ask("predict --run 1").text, HasSubstr("setpoint 0 to 0.2 m, measured"));
+}
+
+TEST_F(RunTools, PredictDoesNotCallAPositionKnownWhoseUncertaintyIsNot) {
+  begin();
+  robot_.context.mode = rheonaut_MODE_AUTO;
+  robot_.context.setpoint_m = 0.2F;
+  robot_.context.position_sd_m = std::nullopt;
+  swim(300, 0.3);
+  flush();
+  const std::string text = ask("predict --run 1").text;
+  EXPECT_THAT(text, HasSubstr("compared with: the robot's own estimate (position_sd_m is not known)\n"));
+  EXPECT_THAT(text, HasSubstr(" ± not known"));
 }
 
 TEST_F(RunTools, PredictNeedsAStepInTheRun) {
