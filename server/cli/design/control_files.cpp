@@ -121,12 +121,16 @@ void round_to_binary32(analysis::CsvColumns& columns) {
   }
 }
 
-void take_off_disturbance(analysis::CsvColumns& columns) {
-  const std::vector<double>& disturbance_m = columns["disturbance_m"];
-  std::vector<double>& position_m = columns["position_m"];
+// Whether there was one.
+bool take_off_disturbance(analysis::CsvColumns& columns) {
+  const auto disturbance = columns.find("disturbance_m"), position = columns.find("position_m");
+  if (disturbance == columns.end() || position == columns.end()) return false;
+  const std::vector<double>& disturbance_m = disturbance->second;
+  std::vector<double>& position_m = position->second;
   for (std::size_t k = 0; k < std::min(disturbance_m.size(), position_m.size()); ++k) {
     if (std::isfinite(disturbance_m[k])) position_m[k] -= disturbance_m[k];
   }
+  return true;
 }
 
 double largest_sd_m(const std::vector<double>& values_m) {
@@ -139,7 +143,9 @@ double largest_sd_m(const std::vector<double>& values_m) {
 std::string choose_channels(const std::string& file, analysis::CsvColumns& columns, bool with_velocity) {
   if (!columns.contains(kPositionSd)) {
     columns.erase("acceleration_m_s2");
-    return "the file has no column position_sd_m: what it holds is taken as measured";
+    std::string reason = "the file has no column position_sd_m: what it holds is taken as measured";
+    if (take_off_disturbance(columns)) reason += ", position_m less disturbance_m, which the robot adds to it";
+    return reason;
   }
   const double position_sd_m = largest_sd_m(columns[kPositionSd]);
   if (storage::is_estimate(position_sd_m)) {

@@ -54,18 +54,19 @@ class RunTools : public RecordingTest {
     robot_.next_seq += count;
   }
 
-  // What an export has of the columns that matter here.
-  void write_csv(storage::RunId run) {
+  // What an export has of the columns that matter here. Without the last, it is no robot's record.
+  void write_csv(storage::RunId run, bool with_sd = true) {
     const auto samples = storage::read_run(path_, run, 10000);
     ASSERT_TRUE(samples) << samples.error().detail;
     std::ofstream out{folder_ / "run.csv"};
-    out << "robot_time_us,position_m,velocity_m_s,acceleration_m_s2,duty,disturbance_m,position_sd_m\n";
+    out << "robot_time_us,position_m,velocity_m_s,acceleration_m_s2,duty,disturbance_m";
+    out << (with_sd ? ",position_sd_m\n" : "\n");
     for (const storage::StoredSample& stored : *samples) {
       const station::Sample& s = stored.sample;
       const auto cell = [](float value) { return std::isfinite(value) ? fmt::format("{}", value) : std::string{}; };
-      out << fmt::format("{},{},{},{},{},{},{}\n", stored.robot_time_us, cell(s.position_m), cell(s.velocity_m_s),
-                         s.acceleration_m_s2, s.duty, station::or_nan(stored.disturbance_m),
-                         cell(station::or_nan(stored.position_sd_m)));
+      out << fmt::format("{},{},{},{},{},{}", stored.robot_time_us, cell(s.position_m), cell(s.velocity_m_s),
+                         s.acceleration_m_s2, s.duty, station::or_nan(stored.disturbance_m));
+      out << (with_sd ? "," + cell(station::or_nan(stored.position_sd_m)) : "") << '\n';
     }
   }
 
@@ -153,6 +154,19 @@ TEST_F(RunTools, ACsvWhosePositionIsNotKnownToBeKnownNeedsTheAcceleration) {
   std::ofstream{folder_ / "run.csv"} << "t_s,duty,position_m,position_sd_m\n0,0,0,0\n0.01,0.3,0,\n0.02,0.3,0,0\n";
   EXPECT_THAT(cli::ask_tool(folder_, "identify --csv @run.csv").error,
               AllOf(HasSubstr("position_sd_m is not known"), HasSubstr("there is no column acceleration_m_s2")));
+}
+
+TEST_F(RunTools, ADisturbanceIsTakenOffAMeasuredPositionToo) {
+  const storage::RunId run = begin();
+  swim(200, 0.3);
+  robot_.context.disturbance_m = -0.05F;
+  swim(200, -0.5);
+  flush();
+  write_csv(run, false);
+  const ToolAnswer answer = cli::ask_tool(folder_, "identify --csv @run.csv --structure fractional --json");
+  ASSERT_EQ(answer.exit_code, 0) << answer.error;
+  EXPECT_NEAR(answer.json()["parameters"]["kp"], 0.1, 1e-3);
+  EXPECT_THAT(answer.json()["channels_reason"].get<std::string>(), HasSubstr("less disturbance_m"));
 }
 
 TEST_F(RunTools, IdentifySaysHowMuchDeadTimeTheSensorsReadingsMayHide) {
