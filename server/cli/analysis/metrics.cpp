@@ -38,15 +38,16 @@ void write_run(const json& metrics, std::ostream& out) {
   steps.write(out);
 }
 
-void write_metric_rows(const MetricsQuestion& options, const char* title, const json& rows, std::ostream& out) {
+void write_metric_rows(const MetricsQuestion& options, const char* title, const char* missing, const json& rows,
+                       std::ostream& out) {
   std::vector<std::string> head{title};
   for (const std::int64_t run : options.runs) head.push_back(fmt::format("run {}", run));
-  for (const char* name : {"mean", "sd", "± 95 %", "limit"}) head.emplace_back(name);
+  for (const char* name : {"runs", "mean", "sd", "± 95 %", "limit"}) head.emplace_back(name);
   Table table{std::move(head)};
   for (const json& row : rows) {
     std::vector<std::string> cells{row.at("name")};
-    for (const json& value : row.at("values")) cells.push_back(number_text(value));
-    for (const char* name : {"mean", "sd", "confidence_half_width", "repeatability_limit"}) {
+    for (const json& value : row.at("values")) cells.push_back(value.is_number() ? number_text(value) : missing);
+    for (const char* name : {"runs", "mean", "sd", "confidence_half_width", "repeatability_limit"}) {
       cells.push_back(number_text(row.at(name)));
     }
     table.row(std::move(cells));
@@ -55,12 +56,12 @@ void write_metric_rows(const MetricsQuestion& options, const char* title, const 
 }
 
 void write_comparison(const MetricsQuestion& options, const json& compared, std::ostream& out) {
-  write_metric_rows(options, "figure", compared.at("figures"), out);
+  write_metric_rows(options, "figure", "-", compared.at("figures"), out);
   std::size_t number = 0;
   for (const json& step : compared.at("steps")) {
     fmt::print(out, "\nstep {}, {}, by the position {}:\n", ++number, step.at("cause").get<std::string>(),
                fmt::join(step.at("position_source").get<std::vector<std::string>>(), ", "));
-    write_metric_rows(options, "measure", step.at("measures"), out);
+    write_metric_rows(options, "measure", "never", step.at("measures"), out);
   }
   const auto differing = compared.at("differing_conditions").get<std::vector<std::string>>();
   if (differing.empty()) return;
