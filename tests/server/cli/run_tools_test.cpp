@@ -363,7 +363,16 @@ TEST_F(RunTools, PredictRepeatsTheRunsStepAndDisturbance) {
   EXPECT_NEAR(json["experiment"]["disturbance_at_s"], 3, 1e-6);
   EXPECT_NEAR(json["experiment"]["duration_s"], 4.99, 1e-6);
   EXPECT_EQ(json["measured_steps"].size(), 2u);
-  EXPECT_THAT(ask("predict --run 1").text, HasSubstr("setpoint 0 to 0.2 m, measured"));
+  const std::string text = ask("predict --run 1").text;
+  EXPECT_THAT(text, HasSubstr("setpoint 0 to 0.2 m, measured"));
+  const std::string with =
+      "plant (29) of the paper, controller (30) of the paper, duty -1 to 1; if the run had others, give --plant and "
+      "--controller; the run's duty was never below 0: if its motor turns one way only, give --duty-min 0";
+  EXPECT_THAT(text, HasSubstr("\npredicted with: " + with + "\n\n"));
+  EXPECT_EQ(json["predicted_with"], with);
+  EXPECT_THAT(ask("predict --run 1 --plant newtonian --duty-min 0").text,
+              HasSubstr("predicted with: plant newtonian, controller (30) of the paper, duty 0 to 1; if the run had "
+                        "others, give --plant and --controller\n\n"));
 }
 
 TEST_F(RunTools, PredictDoesNotCallAPositionKnownWhoseUncertaintyIsNot) {
