@@ -16,6 +16,7 @@ Result<void> check_document(storage::DesignKind kind, const nlohmann::json& docu
 
 // Of designs of one kind. A model's parameters are divided by b3, so that they compare; its uncertainties are as
 // identify found them, null where they are not known. `sigmas_from_first`: of the difference, where both are known.
+// `together`: whether all parameters are those of the first, with their correlations; null where not known.
 Result<OrderedJson> comparison_json(std::span<const storage::Design> designs);
 
 }  // namespace server::analysis

@@ -12,6 +12,7 @@
 #include "control/search/missed_ticks.hpp"
 #include "control/sensor/position_weight.hpp"
 #include "server/analysis/motion_at_start.hpp"
+#include "server/storage/samples/position_sd.hpp"
 
 namespace server::analysis {
 namespace {
@@ -133,7 +134,7 @@ std::optional<RunWindow> with_few_missed(const Piece& piece, std::span<const std
 double largest_position_sd_m(const Piece& piece) {
   double largest_m = 0;
   for (const storage::StoredSample& stored : piece.samples) {
-    largest_m = std::max(largest_m, static_cast<double>(stored.position_sd_m.value_or(0)));
+    largest_m = storage::larger_sd_m(largest_m, static_cast<double>(station::or_nan(stored.position_sd_m)));
   }
   return largest_m;
 }
@@ -295,14 +296,19 @@ std::optional<std::string> driven_before(const Piece& piece) {
 
 }  // namespace
 
+std::string position_sd_in_words(double largest_position_sd_m) {
+  if (std::isnan(largest_position_sd_m)) return "position_sd_m is not known";
+  if (!storage::is_estimate(largest_position_sd_m)) return "position_sd_m is 0 throughout";
+  return fmt::format("position_sd_m is up to {:.2g} m", largest_position_sd_m);
+}
+
 std::string channels_reason(double largest_position_sd_m) {
-  if (!(largest_position_sd_m > 0)) return "the position is known: position_sd_m is 0 throughout";
+  const std::string sd = position_sd_in_words(largest_position_sd_m);
+  if (!storage::is_estimate(largest_position_sd_m)) return "the position is known: " + sd;
   return fmt::format(
-      "position_m and velocity_m_s are the robot's own estimates (position_sd_m is up to {:.2g} m) and contain the "
-      "model "
-      "that is built into it, so the acceleration is fitted, with bias, lag and clock of the sensor as further "
-      "unknowns",
-      largest_position_sd_m);
+      "position_m and velocity_m_s are the robot's own estimates ({}) and contain the model that is built into it, so "
+      "the acceleration is fitted, with bias, lag and clock of the sensor as further unknowns",
+      sd);
 }
 
 const char* text(ChannelChoice value) {
@@ -327,9 +333,9 @@ Result<RunRecording> recording_of(std::span<const storage::StoredSample> samples
     return fail(ErrorCode::invalid, fmt::format("the window has {} positions from outside; at least {} are needed",
                                                 outside.time_s.size(), kFewestPositionsToFit));
   }
-  const Motion motion = outside.is_enough() ? Motion::outside
-                        : position_sd_m > 0 ? Motion::acceleration
-                                            : Motion::position;
+  const Motion motion = outside.is_enough()                   ? Motion::outside
+                        : storage::is_estimate(position_sd_m) ? Motion::acceleration
+                                                              : Motion::position;
   const Cut cut{*piece, window, dt_s, motion, control::most_missed_in_a_row(dt_s)};
   const auto recorded_from = [&](const RunWindow& part, const std::string& why) {
     auto recorded = recording_of(samples, part, reference, choice);

@@ -42,16 +42,17 @@ struct RunRecording {
   double position_sd_m = 0;  // of the mean weight of positions from outside, as their importer said; else 0
 };
 
-// In words; 0: the position is known.
+// In words; 0: the position is known; NaN: it is an estimate whose standard deviation is not known.
+std::string position_sd_in_words(double largest_position_sd_m);
 std::string channels_reason(double largest_position_sd_m);
 
 // A position that was measured from outside, where `reference` has one of the window, is fitted as it was measured, at
-// its own times: it contains no model, and no disturbance. Else, where position_sd_m is above 0 anywhere, position and
-// velocity are the robot's estimates, and the recording holds the acceleration in their place. Else position_m is what
-// was measured: without the disturbance, which the robot adds to it. Periods that the robot skipped, a few, are missed
-// ticks of the recording (control/search/missed_ticks.hpp), with a warning. invalid: several spans to choose from, too
-// few samples, or gaps or missing values; the detail names each (samples that were lost, apart from periods that the
-// robot skipped) and the longest windows without one, as flags.
+// its own times: it contains no model, and no disturbance. Else, where position_sd_m is not known to be 0 throughout,
+// position and velocity are the robot's estimates, and the recording holds the acceleration in their place. Else
+// position_m is what was measured: without the disturbance, which the robot adds to it. A few skipped periods are
+// missed ticks of the recording (control/search/missed_ticks.hpp), with a warning. invalid: several spans to choose
+// from, too few samples, or gaps or missing values; the detail names each (samples that were lost, apart from periods
+// that the robot skipped) and the longest windows without one, as flags.
 Result<RunRecording> recording_of(std::span<const storage::StoredSample> samples, const RunWindow& window,
                                   const storage::StoredReference* reference = nullptr,
                                   ChannelChoice choice = ChannelChoice::best);

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "server/analysis/comparison/outside_at.hpp"
+#include "server/storage/samples/position_sd.hpp"
 
 namespace server::analysis {
 namespace {
@@ -94,8 +95,10 @@ void take_outside(const storage::StoredReference& reference, std::span<const Tra
 }
 
 PositionSource source_of(std::span<const TracePoint> points) {
-  const bool is_estimate = std::ranges::any_of(points, [](const TracePoint& point) { return point.position_sd_m > 0; });
-  return is_estimate ? PositionSource::estimate : PositionSource::known;
+  const auto is_of_estimate = [](const TracePoint& point) {
+    return storage::is_estimate(static_cast<double>(point.position_sd_m));
+  };
+  return std::ranges::any_of(points, is_of_estimate) ? PositionSource::estimate : PositionSource::known;
 }
 
 std::optional<std::size_t> position_column(const TraceChannels& channels) {

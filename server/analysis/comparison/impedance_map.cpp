@@ -8,6 +8,7 @@
 
 #include "base/json_text.hpp"
 #include "server/analysis/comparison/outside_at.hpp"
+#include "server/storage/samples/position_sd.hpp"
 
 namespace server::analysis {
 namespace {
@@ -176,7 +177,7 @@ void ImpedanceBin::add(double impedance_mv, double sd_m) {
   const double step_mv = impedance_mv - mean_mv;
   mean_mv += step_mv / static_cast<double>(count);
   squares_mv2 += step_mv * (impedance_mv - mean_mv);
-  position_sd_m = std::max(position_sd_m, sd_m);
+  position_sd_m = storage::larger_sd_m(position_sd_m, sd_m);
 }
 
 void ImpedanceBin::merge(const ImpedanceBin& other) {
@@ -185,7 +186,7 @@ void ImpedanceBin::merge(const ImpedanceBin& other) {
   mean_mv += step_mv * theirs / (mine + theirs);
   squares_mv2 += other.squares_mv2 + step_mv * step_mv * mine * theirs / (mine + theirs);
   min_mv = std::min(min_mv, other.min_mv);
-  position_sd_m = std::max(position_sd_m, other.position_sd_m);
+  position_sd_m = storage::larger_sd_m(position_sd_m, other.position_sd_m);
   count += other.count;
   runs += other.runs;
 }
@@ -197,11 +198,14 @@ std::optional<double> ImpedanceBin::sd_mv() const {
 
 std::vector<std::string> ImpedanceMap::all_warnings() const {
   std::vector<std::string> all = warnings;
-  const auto is_blurred = [&](const auto& entry) { return entry.second.position_sd_m > bin_m; };
-  const auto blurred = std::ranges::count_if(bins, is_blurred);
-  if (blurred == 0) return all;
-  all.push_back(
-      fmt::format("in {} of {} bins the sd of the position is larger than the bin is wide", blurred, bins.size()));
+  const auto warn = [&](const char* what, auto is_so) {
+    const auto count =
+        std::ranges::count_if(bins, [&](const auto& entry) { return is_so(entry.second.position_sd_m); });
+    if (count > 0)
+      all.push_back(fmt::format("in {} of {} bins the sd of the position is {}", count, bins.size(), what));
+  };
+  warn("larger than the bin is wide", [&](double sd_m) { return sd_m > bin_m; });
+  warn("not known", [](double sd_m) { return std::isnan(sd_m); });
   return all;
 }
 
@@ -219,7 +223,7 @@ Result<ImpedanceMap> impedance_map(storage::RunId run, std::span<const TracePoin
   bool is_estimate = false;
   for (const TracePoint& point : points) {
     const auto position = position_of(point, reference);
-    is_estimate = is_estimate || point.position_sd_m > 0;
+    is_estimate = is_estimate || storage::is_estimate(static_cast<double>(point.position_sd_m));
     if (!position || !std::isfinite(point.impedance_mv)) {
       ++map.samples_left_out;
       continue;

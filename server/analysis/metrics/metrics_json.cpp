@@ -23,8 +23,14 @@ std::optional<double> number_in(const json& object, const char* name) {
   return value.is_number() ? std::optional{value.get<double>()} : std::nullopt;
 }
 
-json row_json(const std::vector<std::optional<double>>& values) {
-  const Repeatability over = repeatability_of(values);
+enum class Missing : std::uint8_t { not_measured, never_reached };
+
+// The mean of the runs that settled would be better than the runs were: a time that one never reached has no mean.
+json row_json(const std::vector<std::optional<double>>& values, Missing missing) {
+  Repeatability over = repeatability_of(values);
+  if (missing == Missing::never_reached && over.runs < values.size()) {
+    over.mean = over.sd = over.confidence_half_width = over.repeatability_limit = std::nullopt;
+  }
   json row{{"values", json::array()}, {"runs", over.runs}};
   for (const auto& value : values) row["values"].push_back(number_or_null(value));
   row["mean"] = number_or_null(over.mean);
@@ -39,7 +45,7 @@ json figures_over(std::span<const json> documents) {
   for (const auto& [name, value] : documents.front().at("figures").items()) {
     std::vector<std::optional<double>> values;
     for (const json& document : documents) values.push_back(number_in(document.at("figures"), name.c_str()));
-    rows.push_back(row_json(values));
+    rows.push_back(row_json(values, Missing::not_measured));
     rows.back()["name"] = name;
   }
   return rows;
@@ -65,7 +71,7 @@ json steps_over(std::span<const json> documents) {
     for (const char* measure : kStepMeasures) {
       std::vector<std::optional<double>> values;
       for (const json& document : documents) values.push_back(number_in(document.at("steps").at(number), measure));
-      step["measures"].push_back(row_json(values));
+      step["measures"].push_back(row_json(values, Missing::never_reached));
       step["measures"].back()["name"] = measure;
     }
     steps.push_back(std::move(step));

@@ -11,7 +11,7 @@
 namespace server::analysis {
 
 // Of the meaning of figures and steps: a number that changes when the same samples would give others.
-inline constexpr int kMetricsVersion = 1;
+inline constexpr int kMetricsVersion = 2;
 
 nlohmann::json json_of(const std::optional<EstimateError>& error);
 nlohmann::json json_of(const MeasuredStep& step);

@@ -5,10 +5,14 @@
 #include <cmath>
 #include <optional>
 
+#include "server/storage/samples/position_sd.hpp"
+
 namespace server::analysis {
 namespace {
 
 constexpr double kBandOfStep = 0.02;
+constexpr double kSmallestStepM = 0.002;
+constexpr double kShortestStepS = 1;     // until the next setpoint
 constexpr double kLongestPauseS = 0.25;  // in a reference: a longer one hides too much of a step
 constexpr double kLongestStepS = 0.1;    // between samples of the robot, to compare in between
 constexpr std::size_t kFewestPositionsOfAStep = 10;
@@ -85,10 +89,13 @@ PositionAt on_line(const storage::OutsidePositions& outside, std::size_t first, 
   return {mean_m - slope_m_s * mean_s, std::sqrt(variance_m2)};
 }
 
+bool continues(const StepPoint& before, const StepPoint& point) {
+  return usable(before) && before.span == point.span && before.robot_time_us < point.robot_time_us;
+}
+
 // Why a step begins with `point`, given the point before it.
 std::optional<StepCause> step_at(const StepPoint& before, const StepPoint& point) {
-  const bool continues = usable(before) && before.span == point.span && before.robot_time_us < point.robot_time_us;
-  if (!continues || before.setpoint_m != point.setpoint_m) return StepCause::setpoint;
+  if (!continues(before, point) || before.setpoint_m != point.setpoint_m) return StepCause::setpoint;
   if (before.disturbance_m != point.disturbance_m) return StepCause::disturbance;
   return std::nullopt;
 }
@@ -104,12 +111,15 @@ class Cutter {
       finish();
     } else {
       const auto cause = step_at(before_, point);
+      const bool is_on_a_path = cause == StepCause::setpoint && continues(before_, point) && !time_s_.empty() &&
+                                seconds(point) - step_.at_s < kShortestStepS;
+      if (is_on_a_path) drop();
       if (cause) begin(*cause, point);
       points_of_step_.push_back(point);
       time_s_.push_back(seconds(point));
       position_m_.push_back(static_cast<double>(point.position_m));
       step_.last_seq = point.seq;
-      step_.position_sd_m = std::max(step_.position_sd_m, static_cast<double>(point.position_sd_m));
+      step_.position_sd_m = storage::larger_sd_m(step_.position_sd_m, static_cast<double>(point.position_sd_m));
     }
     before_ = point;
   }
@@ -133,12 +143,14 @@ class Cutter {
     step_.at_s = seconds(point);
     step_.start_m = static_cast<double>(point.position_m);
     step_.target_m = static_cast<double>(point.setpoint_m);
-    if (cause == StepCause::setpoint || band_m_ == 0) band_m_ = kBandOfStep * std::abs(step_.target_m - step_.start_m);
-    step_.band_m = band_m_;
+    step_.band_m = cause == StepCause::setpoint || band_m_ == 0 ? kBandOfStep * size_m() : band_m_;
   }
 
+  double size_m() const { return std::abs(step_.target_m - step_.start_m); }
+
   void finish() {
-    if (!time_s_.empty() && step_.start_m != step_.target_m && step_.band_m > 0) {
+    if (!time_s_.empty() && size_m() >= kSmallestStepM) {
+      band_m_ = step_.band_m;
       control::StepExperiment experiment;
       experiment.step_at_s = step_.at_s;
       experiment.start_m = step_.start_m;
@@ -148,6 +160,10 @@ class Cutter {
       if (reference_ != nullptr && reference_->reference.span == step_.span) measure_from_outside();
       steps_.push_back(step_);
     }
+    drop();
+  }
+
+  void drop() {
     time_s_.clear();
     position_m_.clear();
     points_of_step_.clear();
@@ -236,7 +252,7 @@ const char* text(StepCause value) { return value == StepCause::setpoint ? "setpo
 
 const char* position_source(const MeasuredStep& step) {
   if (step.is_from_outside) return "outside";
-  return step.position_sd_m > 0 ? "estimate" : "known";
+  return storage::is_estimate(step.position_sd_m) ? "estimate" : "known";
 }
 
 std::vector<MeasuredStep> measure_steps(const std::vector<StepPoint>& points,

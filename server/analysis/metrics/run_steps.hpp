@@ -1,8 +1,10 @@
 // Finds the steps of a recorded experiment and measures each: new setpoints and injected disturbances, in auto mode.
 //
 // A step begins with the first sample that carries a new setpoint_m or disturbance_m, and ends with the next step, with
-// auto mode, or with the recording's span. It starts from the position of its first sample. The settling band is ±2 %
-// of the latest change of setpoint, for disturbances too (as the paper's table reads).
+// auto mode, or with the recording's span. It starts from the position of its first sample. A step of less than 2 mm is
+// left out: to hold is no step. So is one that a new setpoint ends within 1 s: setpoints that follow one another so
+// fast are a path. The settling band is ±2 % of the latest step of setpoint, for disturbances too (as the paper's table
+// reads).
 // Where the position was measured from outside throughout a step, the step is measured by that (with the disturbance,
 // which the robot's controller sees on top of it), and the robot's own position is compared with it. It then starts
 // from where a line through the outside positions of the 200 ms before it passes at its first sample. Pure and slow for
@@ -28,7 +30,7 @@ struct StepPoint {
   float disturbance_m = 0;
   float setpoint_m = 0;
   bool steered = false;     // in auto mode with a setpoint
-  float position_sd_m = 0;  // of an estimated position; 0: known
+  float position_sd_m = 0;  // of an estimated position; 0: known; NaN: an estimate, not known how good
 };
 
 StepPoint step_point(const storage::StoredSample& stored);
@@ -54,7 +56,7 @@ struct MeasuredStep {
   double target_m = 0;
   double band_m = 0;
   double position_sd_m = 0;  // the largest in the step, start_m's and the zero's counted: every position in `metrics`
-                             // is uncertain by ± 2 of it
+                             // is uncertain by ± 2 of it; NaN where it is anywhere
   bool is_from_outside = false;  // positions, metrics and position_sd_m are those of the outside reference
   std::optional<EstimateError> estimate_error;  // then
   control::StepMetrics metrics;
@@ -62,7 +64,7 @@ struct MeasuredStep {
 
 const char* position_source(const MeasuredStep& step);  // "outside", "estimate" or "known"
 
-// Points in order of span and seq. A step that goes nowhere is left out; a position that is not finite ends a step.
+// Points in order of span and seq. A position that is not finite ends a step.
 std::vector<MeasuredStep> measure_steps(const std::vector<StepPoint>& points,
                                         const storage::StoredReference* reference = nullptr);
 

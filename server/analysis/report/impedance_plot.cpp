@@ -8,6 +8,7 @@
 
 #include "server/analysis/report/page.hpp"
 #include "server/analysis/report/svg_plot.hpp"
+#include "server/storage/samples/position_sd.hpp"
 
 namespace server::analysis {
 namespace {
@@ -110,12 +111,12 @@ std::string events_table(const ImpedanceMap& map) {
 
 std::string impedance_section(const ImpedanceMap& map) {
   double largest_sd_m = 0;
-  for (const auto& [key, bin] : map.bins) largest_sd_m = std::max(largest_sd_m, bin.position_sd_m);
+  for (const auto& [key, bin] : map.bins) largest_sd_m = storage::larger_sd_m(largest_sd_m, bin.position_sd_m);
   std::string out = "<h2>Impedance over position</h2>\n" + svg_of(plot_of_map(map)) + events_table(map);
   out += fmt::format(
       "<p class=\"quiet\">Means of bins of {:.3g} mm, of all runs together; the largest ± 2 sd of a "
-      "position in them is {:.2g} m.</p>\n",
-      1e3 * map.bin_m, 2 * largest_sd_m);
+      "position in them is {}.</p>\n",
+      1e3 * map.bin_m, std::isnan(largest_sd_m) ? "not known" : fmt::format("{:.2g} m", 2 * largest_sd_m));
   const std::vector<std::string> warnings = map.all_warnings();
   if (warnings.empty()) return out;
   out += "<ul class=\"quiet\">";

@@ -171,7 +171,7 @@ std::string steps(const json& metrics) {
       out += fmt::format("<td class=\"number\">{}</td>", number_text(step.at(name)));
     }
     out += fmt::format("<td class=\"number\">{}</td><td>{}</td></tr>\n",
-                       sd_m.is_number() ? fmt::format("{:.2g}", 2 * sd_m.get<double>()) : "–",
+                       sd_m.is_number() ? fmt::format("{:.2g}", 2 * sd_m.get<double>()) : "not known",
                        html_escaped(step.at("position_source")));
   }
   return out +

@@ -136,6 +136,15 @@ int compare(const DesignCommand& options, std::ostream& out) {
     }
   }
   table.write(out);
+  for (std::size_t i = 1; i < answer.at("designs").size(); ++i) {
+    const json& together = answer.at("together")[i];
+    if (together.is_null()) continue;
+    fmt::print(out,
+               "all parameters of design {} together, from those of the first: chi-square {:.3g} with {} degrees of "
+               "freedom, p = {:.2g}\n",
+               id_text(answer.at("designs")[i].at("design_id")), together.at("chi_square").get<double>(),
+               together.at("degrees_of_freedom").get<int>(), together.at("p").get<double>());
+  }
   return 0;
 }
 

@@ -29,24 +29,25 @@ void write_run(const json& metrics, std::ostream& out) {
   Table steps{{"step", "at (s)", "target (m)", "settling (s)", "overshoot (%)", "rise (s)", "error (m)", "± 2 sd (m)",
                "<position"}};
   for (const json& step : metrics.at("steps")) {
-    const double two_sd_m = step.at("position_sd_m").is_number() ? 2 * step.at("position_sd_m").get<double>() : 0;
+    const json& sd_m = step.at("position_sd_m");
     steps.row({step.at("cause"), number_text(step.at("at_s")), number_text(step.at("target_m")),
                number_text(step.at("settling_s")), number_text(step.at("overshoot_percent")),
-               number_text(step.at("rise_10_90_s")), number_text(step.at("steady_state_error_m")), cell(two_sd_m, 3),
-               step.at("position_source")});
+               number_text(step.at("rise_10_90_s")), number_text(step.at("steady_state_error_m")),
+               sd_m.is_number() ? cell(2 * sd_m.get<double>(), 3) : "not known", step.at("position_source")});
   }
   steps.write(out);
 }
 
-void write_metric_rows(const MetricsQuestion& options, const char* title, const json& rows, std::ostream& out) {
+void write_metric_rows(const MetricsQuestion& options, const char* title, const char* missing, const json& rows,
+                       std::ostream& out) {
   std::vector<std::string> head{title};
   for (const std::int64_t run : options.runs) head.push_back(fmt::format("run {}", run));
-  for (const char* name : {"mean", "sd", "± 95 %", "limit"}) head.emplace_back(name);
+  for (const char* name : {"runs", "mean", "sd", "± 95 %", "limit"}) head.emplace_back(name);
   Table table{std::move(head)};
   for (const json& row : rows) {
     std::vector<std::string> cells{row.at("name")};
-    for (const json& value : row.at("values")) cells.push_back(number_text(value));
-    for (const char* name : {"mean", "sd", "confidence_half_width", "repeatability_limit"}) {
+    for (const json& value : row.at("values")) cells.push_back(value.is_number() ? number_text(value) : missing);
+    for (const char* name : {"runs", "mean", "sd", "confidence_half_width", "repeatability_limit"}) {
       cells.push_back(number_text(row.at(name)));
     }
     table.row(std::move(cells));
@@ -55,12 +56,12 @@ void write_metric_rows(const MetricsQuestion& options, const char* title, const 
 }
 
 void write_comparison(const MetricsQuestion& options, const json& compared, std::ostream& out) {
-  write_metric_rows(options, "figure", compared.at("figures"), out);
+  write_metric_rows(options, "figure", "-", compared.at("figures"), out);
   std::size_t number = 0;
   for (const json& step : compared.at("steps")) {
     fmt::print(out, "\nstep {}, {}, by the position {}:\n", ++number, step.at("cause").get<std::string>(),
                fmt::join(step.at("position_source").get<std::vector<std::string>>(), ", "));
-    write_metric_rows(options, "measure", step.at("measures"), out);
+    write_metric_rows(options, "measure", "never", step.at("measures"), out);
   }
   const auto differing = compared.at("differing_conditions").get<std::vector<std::string>>();
   if (differing.empty()) return;

@@ -18,6 +18,7 @@
 #include "server/analysis/control_json.hpp"
 #include "server/analysis/motion_at_start.hpp"
 #include "server/cli/terminal/options.hpp"
+#include "server/storage/samples/position_sd.hpp"
 
 namespace server::cli {
 namespace {
@@ -120,33 +121,38 @@ void round_to_binary32(analysis::CsvColumns& columns) {
   }
 }
 
-void take_off_disturbance(analysis::CsvColumns& columns) {
-  const std::vector<double>& disturbance_m = columns["disturbance_m"];
-  std::vector<double>& position_m = columns["position_m"];
+// Whether there was one.
+bool take_off_disturbance(analysis::CsvColumns& columns) {
+  const auto disturbance = columns.find("disturbance_m"), position = columns.find("position_m");
+  if (disturbance == columns.end() || position == columns.end()) return false;
+  const std::vector<double>& disturbance_m = disturbance->second;
+  std::vector<double>& position_m = position->second;
   for (std::size_t k = 0; k < std::min(disturbance_m.size(), position_m.size()); ++k) {
     if (std::isfinite(disturbance_m[k])) position_m[k] -= disturbance_m[k];
   }
+  return true;
 }
 
-double largest_of(const std::vector<double>& values) {
-  double largest = 0;
-  for (const double value : values) {
-    if (value > largest) largest = value;
-  }
-  return largest;
+double largest_sd_m(const std::vector<double>& values_m) {
+  double largest_m = 0;
+  for (const double value_m : values_m) largest_m = storage::larger_sd_m(largest_m, value_m);
+  return largest_m;
 }
 
 // Leaves the columns that are fitted.
 std::string choose_channels(const std::string& file, analysis::CsvColumns& columns, bool with_velocity) {
   if (!columns.contains(kPositionSd)) {
     columns.erase("acceleration_m_s2");
-    return "the file has no column position_sd_m: what it holds is taken as measured";
+    std::string reason = "the file has no column position_sd_m: what it holds is taken as measured";
+    if (take_off_disturbance(columns)) reason += ", position_m less disturbance_m, which the robot adds to it";
+    return reason;
   }
-  const double position_sd_m = largest_of(columns[kPositionSd]);
-  if (position_sd_m > 0) {
+  const double position_sd_m = largest_sd_m(columns[kPositionSd]);
+  if (storage::is_estimate(position_sd_m)) {
     if (!columns.contains("acceleration_m_s2")) {
-      refuse(file,
-             fmt::format("{}; but there is no column acceleration_m_s2", analysis::channels_reason(position_sd_m)));
+      refuse(file, fmt::format("{}; but there is no column acceleration_m_s2. If the position was measured, delete the "
+                               "column position_sd_m",
+                               analysis::channels_reason(position_sd_m)));
     }
     columns.erase("position_m");
     columns.erase("velocity_m_s");

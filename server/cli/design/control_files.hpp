@@ -39,9 +39,9 @@ analysis::CsvColumns read_csv(const std::string& file, std::initializer_list<con
                               std::initializer_list<const char*> with_gaps = {});
 
 // Columns t_s (or robot_time_us, as the station exports), duty, and position_m or velocity_m_s or both. Where a column
-// position_sd_m says that the position is an estimate, acceleration_m_s2 is taken in their place. A file with that
-// column is a robot's record and is read as a run is: in binary32, without the disturbance, with_velocity only if asked
-// for.
+// position_sd_m says that the position is an estimate (an empty cell does, too), acceleration_m_s2 is taken in their
+// place. A file with that column is a robot's record and is read as a run is: in binary32, with_velocity only if asked
+// for. A column disturbance_m is subtracted from position_m, to which the robot adds it.
 analysis::RunRecording read_recording(const std::string& file, bool with_velocity);
 
 }  // namespace server::cli

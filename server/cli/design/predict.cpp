@@ -6,11 +6,13 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <cmath>
 
 #include "server/analysis/control_json.hpp"
 #include "server/analysis/metrics/run_steps.hpp"
 #include "server/cli/design/robustness_table.hpp"
 #include "server/cli/terminal/options.hpp"
+#include "server/storage/samples/position_sd.hpp"
 
 namespace server::cli {
 namespace {
@@ -22,12 +24,13 @@ struct Measured {
   std::vector<analysis::MeasuredStep> steps;
   double began_at_s = 0;
   std::string position_source;  // in words
+  std::string predicted_with;   // in words: what the run may not have had
 };
 
 double largest_sd_m(std::span<const analysis::MeasuredStep> steps, bool is_from_outside) {
   double largest_m = 0;
   for (const analysis::MeasuredStep& step : steps) {
-    if (step.is_from_outside == is_from_outside) largest_m = std::max(largest_m, step.position_sd_m);
+    if (step.is_from_outside == is_from_outside) largest_m = storage::larger_sd_m(largest_m, step.position_sd_m);
   }
   return largest_m;
 }
@@ -36,9 +39,9 @@ double largest_sd_m(std::span<const analysis::MeasuredStep> steps, bool is_from_
 std::string source_in_words(std::span<const analysis::MeasuredStep> steps,
                             const std::optional<storage::StoredReference>& reference) {
   const double own_sd_m = largest_sd_m(steps, false);
-  const std::string own = own_sd_m > 0
-                              ? fmt::format("the robot's own estimate (position_sd_m is up to {:.2g} m)", own_sd_m)
-                              : std::string{"the position is known: position_sd_m is 0 throughout"};
+  const std::string sd = analysis::position_sd_in_words(own_sd_m);
+  const std::string own = storage::is_estimate(own_sd_m) ? fmt::format("the robot's own estimate ({})", sd)
+                                                         : "the position is known: " + sd;
   if (!reference) return own;
   const auto outside = std::ranges::count(steps, true, &analysis::MeasuredStep::is_from_outside);
   if (outside == 0) {
@@ -50,6 +53,21 @@ std::string source_in_words(std::span<const analysis::MeasuredStep> steps,
   return fmt::format("{}, in {} of {} steps; in the others {}", measured, outside, steps.size(), own);
 }
 
+// In words: what the prediction assumes, and the run may not have had.
+std::string predicted_with(const Predict& options, std::span<const storage::StoredSample> samples) {
+  std::string words = fmt::format(
+      "plant {}, controller {}, duty {:g} to {:g}", options.plant.file.value_or("(29) of the paper"),
+      options.controller.file.value_or("(30) of the paper"), options.experiment.duty_min, options.experiment.duty_max);
+  if (!options.plant.file || !options.controller.file) {
+    words += "; if the run had others, give --plant and --controller";
+  }
+  const auto is_backwards = [](const storage::StoredSample& stored) { return stored.sample.duty < 0; };
+  if (options.experiment.duty_min < 0 && std::ranges::none_of(samples, is_backwards)) {
+    words += "; the run's duty was never below 0: if its motor turns one way only, give --duty-min 0";
+  }
+  return words;
+}
+
 double time_of(std::span<const analysis::StepPoint> points, std::uint32_t span, std::uint64_t seq) {
   const auto is_of_span = [span](const analysis::StepPoint& point) { return point.span == span; };
   const auto first = std::ranges::find_if(points, is_of_span);
@@ -59,9 +77,11 @@ double time_of(std::span<const analysis::StepPoint> points, std::uint32_t span, 
 }
 
 // Makes the experiment the run's first step of setpoint, with the disturbance that follows it.
-Measured follow(const RunChoice& choice, control::ClosedLoopExperiment& experiment) {
+Measured follow(const Predict& options, control::ClosedLoopExperiment& experiment) {
+  const RunChoice& choice = options.run;
+  const std::vector<storage::StoredSample> samples = read_samples(choice);
   std::vector<analysis::StepPoint> points;
-  for (const storage::StoredSample& stored : read_samples(choice)) points.push_back(analysis::step_point(stored));
+  for (const storage::StoredSample& stored : samples) points.push_back(analysis::step_point(stored));
   const std::optional<storage::StoredReference> reference = read_reference(choice);
   Measured measured;
   measured.steps = measure_steps(points, reference ? &*reference : nullptr);
@@ -72,6 +92,7 @@ Measured follow(const RunChoice& choice, control::ClosedLoopExperiment& experime
   }
   measured.began_at_s = first->at_s;
   measured.position_source = source_in_words(steps, reference);
+  measured.predicted_with = predicted_with(options, samples);
   experiment.setpoint_m = first->target_m - first->start_m;
   experiment.settling_band_m = first->band_m;  // of the robot's own step, also where the start is the true one
   experiment.duration_s = time_of(points, first->span, first->last_seq) - first->at_s;
@@ -113,14 +134,18 @@ analysis::OrderedJson measured_step_json(const analysis::MeasuredStep& step) {
 // Of an estimated position with its ± 2 sd.
 void add_row(Table& table, const std::string& name, double at_s, const control::StepMetrics& m,
              double position_sd_m = 0) {
-  const std::string within = position_sd_m > 0 ? " ± " + fixed(2e3 * position_sd_m, 1) : "";
+  const std::string within = std::isnan(position_sd_m)             ? " ± not known"
+                             : storage::is_estimate(position_sd_m) ? " ± " + fixed(2e3 * position_sd_m, 1)
+                                                                   : "";
   table.row({name, cell(at_s, 5), m.settling_s ? cell(*m.settling_s, 4) : "never", fixed(m.overshoot_percent, 2),
              cell(m.rise_10_90_s, 4), fixed(1e3 * m.steady_state_error_m, 3) + within});
 }
 
 void write_table(std::ostream& out, const control::ClosedLoopExperiment& experiment,
                  const control::ClosedLoopPrediction& prediction, const Measured& measured) {
-  if (!measured.steps.empty()) fmt::print(out, "compared with: {}\n\n", measured.position_source);
+  if (!measured.steps.empty()) {
+    fmt::print(out, "compared with: {}\npredicted with: {}\n\n", measured.position_source, measured.predicted_with);
+  }
   Table table{{"step", "at (s)", "settling (s)", "overshoot (%)", "rise 10-90 % (s)", "error at the end (mm)"}};
   add_row(table, fmt::format("to {:g} m, predicted", experiment.setpoint_m), measured.began_at_s, prediction.step);
   if (experiment.disturbance_at_s < experiment.duration_s) {
@@ -180,6 +205,8 @@ analysis::OrderedJson answer_of(const control::ClosedLoopExperiment& experiment,
   if (experiment.settling_band_m > 0) answer["experiment"]["settling_band_m"] = experiment.settling_band_m;
   answer["compared_with"] =
       measured.steps.empty() ? analysis::OrderedJson{} : analysis::OrderedJson(measured.position_source);
+  answer["predicted_with"] =
+      measured.steps.empty() ? analysis::OrderedJson{} : analysis::OrderedJson(measured.predicted_with);
   answer["measured_steps"] = analysis::OrderedJson::array();
   for (const analysis::MeasuredStep& step : measured.steps)
     answer["measured_steps"].push_back(measured_step_json(step));
@@ -212,7 +239,7 @@ void add_options(CLI::App& command, Predict& options) {
 int run(const Predict& options, std::ostream& out) {
   const control::DiscretisationChoice controller = discretised(read(options.controller), options.sampling);
   control::ClosedLoopExperiment experiment = options.experiment;
-  const Measured measured = options.run.run ? follow(options.run, experiment) : Measured{};
+  const Measured measured = options.run.run ? follow(options, experiment) : Measured{};
   experiment.plant = read(options.plant);
   experiment.controller = controller.chosen.sections;
   experiment.period_s = options.sampling.period_s;

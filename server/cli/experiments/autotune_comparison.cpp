@@ -76,9 +76,10 @@ void write_comparison(std::ostream& out, const json& steps) {
   for (const json& step : steps) {
     const std::string name = fmt::format("{} {:.4g} to {:.4g} m", step.at("cause").get<std::string>(),
                                          step.at("start_m").get<double>(), step.at("target_m").get<double>());
-    const double two_sd_mm = 2e3 * step.at("position_sd_m").get<double>();
+    const json& sd_m = step.at("position_sd_m");
+    const std::string within = sd_m.is_number() ? fixed(2e3 * sd_m.get<double>(), 1) + " mm" : "not known";
     add_row(table, name + ", measured", step.at("measured"),
-            fmt::format("{}, ± {} mm", step.at("position_source").get<std::string>(), fixed(two_sd_mm, 1)));
+            fmt::format("{}, ± {}", step.at("position_source").get<std::string>(), within));
     add_row(table, name + ", predicted", step.at("predicted"), "");
   }
   table.write(out);

@@ -180,6 +180,14 @@ TEST(GridTraces, APositionFromOutsideTakesThePlaceOfTheEstimate) {
   EXPECT_EQ(gridded(trace, 0, "position_m").position_source, analysis::PositionSource::estimate);
 }
 
+TEST(GridTraces, APositionWhoseUncertaintyIsNotKnownIsAnEstimate) {
+  Trace trace;
+  for (int i = 0; i < 10; ++i) trace.add().position_sd_m = i == 5 ? std::nanf("") : 0;
+  EXPECT_EQ(gridded(trace, 0, "position_m").position_source, analysis::PositionSource::estimate);
+  for (TracePoint& point : trace.points) point.position_sd_m = 0;
+  EXPECT_EQ(gridded(trace, 0, "position_m").position_source, analysis::PositionSource::known);
+}
+
 analysis::AlignedRun aligned_run(storage::RunId id, const Trace& trace, double at_s, const char* channels) {
   return {id, "a", {at_s, 0, 0, 0, 0}, gridded(trace, at_s, channels)};
 }
@@ -238,6 +246,19 @@ Trace scan() {
     point.impedance_mv = at_mm >= 40 && at_mm < 60 ? 120 : 175;
   }
   return trace;
+}
+
+TEST(ImpedanceMaps, APositionWhoseUncertaintyIsNotKnownIsAnEstimate) {
+  Trace trace = scan();
+  for (TracePoint& point : trace.points) point.position_sd_m = 0;
+  trace.points[43].position_sd_m = std::nanf("");
+  const auto map = impedance_map(3, trace.points, {}, 0.01, nullptr);
+  ASSERT_TRUE(map);
+  EXPECT_THAT(map->sources, ElementsAre(analysis::PositionSource::estimate));
+  EXPECT_TRUE(std::isnan(map->bins.at({analysis::Direction::forward, 4}).position_sd_m));
+  EXPECT_EQ(map->bins.at({analysis::Direction::forward, 5}).position_sd_m, 0);
+  EXPECT_THAT(map->all_warnings(), ElementsAre(HasSubstr("the robot's own estimate"),
+                                               HasSubstr("in 1 of 21 bins the sd of the position is not known")));
 }
 
 TEST(ImpedanceMaps, GoAndComeBackSeparately) {

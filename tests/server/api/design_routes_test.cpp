@@ -192,12 +192,40 @@ TEST_F(DesignRoutesTest, ComparesParametersInUnitsOfTheirUncertainty) {
   EXPECT_NEAR(kp["relative_to_first"][1].get<double>(), 0.1, 1e-12);
   EXPECT_NEAR(kp["sigmas_from_first"][1].get<double>(), 2, 1e-9);
   EXPECT_EQ(kp["sigmas_from_first"][2], nullptr) << "it was written by hand";
+  EXPECT_EQ(compared["together"][0], nullptr);
+  EXPECT_EQ(compared["together"][2], nullptr);
   EXPECT_EQ(ask("GET", "/api/v1/design-comparison").status, 400);
   EXPECT_EQ(ask("GET", "/api/v1/design-comparison?ids=1").status, 400);
   EXPECT_EQ(ask("GET", "/api/v1/design-comparison?ids=1,9").status, 404);
   ASSERT_EQ(store({{"kind", "controller"}, {"name", "PD"}, {"document", {{"kp", 1}, {"kd", 1}, {"mu", 1}}}}).status,
             201);
   EXPECT_EQ(ask("GET", "/api/v1/design-comparison?ids=1,4").parsed()["reason"], "other_kind");
+}
+
+// Where a fit cannot tell kp from b2, they are wrong together: along that line it is the same model, across it another.
+TEST_F(DesignRoutesTest, ComparesAllParametersTogetherWithTheirCorrelations) {
+  const auto fit = [](double kp, double b2) {
+    json made = a_fit(kp, 0.003);
+    made["parameters"]["b2"] = b2;
+    made["correlation"][0][2] = made["correlation"][2][0] = 0.99;
+    return made;
+  };
+  for (const double b2 : {0.11, 0.116, 0.104}) {
+    ASSERT_EQ(store_model("fit", fit(b2 == 0.11 ? 0.1 : 0.106, b2)).status, 201);
+  }
+  json other_order = a_model();
+  other_order["alpha"] = 1.8;
+  ASSERT_EQ(store_model("other alpha", other_order).status, 201);
+  const json compared = ask("GET", "/api/v1/design-comparison?ids=1,2,3,4").parsed();
+  const json &along = compared["together"][1], &across = compared["together"][2];
+  EXPECT_NEAR(along["chi_square"].get<double>(), 2 * 2 / 1.99, 1e-6);
+  EXPECT_EQ(along["degrees_of_freedom"], 5);
+  EXPECT_NEAR(along["p"].get<double>(), 0.848, 1e-3);
+  EXPECT_NEAR(across["chi_square"].get<double>(), 2 * 2 / 0.01, 1e-3);
+  EXPECT_LT(across["p"].get<double>(), 1e-9);
+  EXPECT_EQ(compared["together"][3], nullptr) << "it was written by hand";
+  EXPECT_EQ(compared["parameters"][1]["relative_to_first"], json({0.0, 0.0, 0.0, nullptr})) << "b1 is in s^alpha";
+  EXPECT_EQ(compared["parameters"][2]["relative_to_first"][3], 0.0) << "b2 is in s^beta, which is the same";
 }
 
 }  // namespace

@@ -184,6 +184,9 @@ TEST(MetricsComparison, StepsAreThoseThatAllRunsHaveWithTheSameCause) {
   EXPECT_EQ(compared["steps"][0]["measures"][0]["name"], "settling_s");
   EXPECT_EQ(compared["steps"][0]["measures"][0]["mean"], 1.25);
   EXPECT_EQ(compared["steps"][1]["measures"][0]["runs"], 1) << "one never settled";
+  for (const char* name : {"mean", "sd", "confidence_half_width", "repeatability_limit"}) {
+    EXPECT_TRUE(compared["steps"][1]["measures"][0][name].is_null()) << name << " of those that settled is too good";
+  }
   EXPECT_THAT(compared["steps"][0]["position_source"], ElementsAre("estimate", "estimate"));
   EXPECT_EQ(compared["figures"][0]["mean"], 1);
   EXPECT_TRUE(compared["differing_conditions"].empty());

@@ -21,6 +21,7 @@ class RunStepsTest : public ::testing::Test {
       position_m_ += 0.1F * (setpoint_m - position_m_);
     }
   }
+  void position_at(float position_m) { position_m_ = position_m; }
   void rest(int samples) {
     for (int i = 0; i < samples; ++i) add(0, false);
   }
@@ -52,6 +53,42 @@ TEST_F(RunStepsTest, SaysHowUncertainAnEstimatedPositionWas) {
   ASSERT_EQ(steps.size(), 2U);
   EXPECT_FLOAT_EQ(static_cast<float>(steps[0].position_sd_m), 0.003F);
   EXPECT_FLOAT_EQ(static_cast<float>(steps[1].position_sd_m), 0.002F);
+}
+
+TEST_F(RunStepsTest, OfAPositionWhoseUncertaintyIsNotKnownIsAnEstimate) {
+  steer(0.1F, 0, 100);
+  position_sd_m = std::numeric_limits<float>::quiet_NaN();
+  steer(0.1F, 0, 10);
+  position_sd_m = 0;
+  steer(0.1F, 0, 100);
+  const auto steps = measure_steps(points);
+  ASSERT_EQ(steps.size(), 1U);
+  EXPECT_STREQ(position_source(steps[0]), "estimate");
+  EXPECT_TRUE(std::isnan(steps[0].position_sd_m)) << "not the largest of those that are known";
+}
+
+TEST_F(RunStepsTest, HoldingNearlyWhereItIsIsNoStepAndSetsNoBand) {
+  position_at(0.0996F);
+  steer(0.1F, 0, 500);
+  steer(0.1F, -0.05F, 500);
+  steer(0.1F, -0.0495F, 500);
+  const auto steps = measure_steps(points);
+  ASSERT_EQ(steps.size(), 1U);
+  EXPECT_EQ(steps[0].cause, analysis::StepCause::disturbance);
+  EXPECT_NEAR(steps[0].band_m, 0.001, 1e-6) << "2 % of itself, as no setpoint was changed";
+  EXPECT_TRUE(steps[0].metrics.settling_s);
+}
+
+TEST_F(RunStepsTest, AScanIsAPathNotHundredsOfSteps) {
+  steer(0.1F, 0, 500);
+  for (int i = 1; i <= 200; ++i) steer(0.1F + 0.01F * static_cast<float>(i), 0, 5);
+  steer(2.1F, 0, 500);
+  steer(2.1F, -0.05F, 500);
+  const auto steps = measure_steps(points);
+  ASSERT_EQ(steps.size(), 3U);
+  EXPECT_NEAR(steps[0].target_m, 0.1, 1e-6);
+  EXPECT_NEAR(steps[1].target_m, 2.1, 1e-6) << "where it is held";
+  EXPECT_EQ(steps[2].cause, analysis::StepCause::disturbance);
 }
 
 TEST_F(RunStepsTest, MeasuresSetpointsAndDisturbances) {
@@ -88,11 +125,11 @@ TEST_F(RunStepsTest, ANewSpanIsANewStep) {
 
 TEST_F(RunStepsTest, AnUnusablePositionEndsTheStep) {
   steer(0.1F, 0, 100);
-  points[50].position_m = std::numeric_limits<float>::quiet_NaN();
+  points[20].position_m = std::numeric_limits<float>::quiet_NaN();
   const auto steps = measure_steps(points);
   ASSERT_EQ(steps.size(), 2U);
-  EXPECT_EQ(steps[0].last_seq, 49U);
-  EXPECT_EQ(steps[1].first_seq, 51U);
+  EXPECT_EQ(steps[0].last_seq, 19U);
+  EXPECT_EQ(steps[1].first_seq, 21U);
 }
 
 TEST_F(RunStepsTest, NothingSteeredIsNoStep) {

@@ -66,18 +66,19 @@ class RunTools : public RecordingTest {
     robot_.next_seq += count;
   }
 
-  // What an export has of the columns that matter here.
-  void write_csv(storage::RunId run) {
+  // What an export has of the columns that matter here. Without the last, it is no robot's record.
+  void write_csv(storage::RunId run, bool with_sd = true) {
     const auto samples = storage::read_run(path_, run, 10000);
     ASSERT_TRUE(samples) << samples.error().detail;
     std::ofstream out{folder_ / "run.csv"};
-    out << "robot_time_us,position_m,velocity_m_s,acceleration_m_s2,duty,disturbance_m,position_sd_m\n";
+    out << "robot_time_us,position_m,velocity_m_s,acceleration_m_s2,duty,disturbance_m";
+    out << (with_sd ? ",position_sd_m\n" : "\n");
     for (const storage::StoredSample& stored : *samples) {
       const station::Sample& s = stored.sample;
       const auto cell = [](float value) { return std::isfinite(value) ? fmt::format("{}", value) : std::string{}; };
-      out << fmt::format("{},{},{},{},{},{},{}\n", stored.robot_time_us, cell(s.position_m), cell(s.velocity_m_s),
-                         s.acceleration_m_s2, s.duty, station::or_nan(stored.disturbance_m),
-                         station::or_nan(stored.position_sd_m));
+      out << fmt::format("{},{},{},{},{},{}", stored.robot_time_us, cell(s.position_m), cell(s.velocity_m_s),
+                         s.acceleration_m_s2, s.duty, station::or_nan(stored.disturbance_m));
+      out << (with_sd ? "," + cell(station::or_nan(stored.position_sd_m)) : "") << '\n';
     }
   }
 
@@ -148,6 +149,36 @@ TEST_F(RunTools, IdentifyFitsTheAccelerationWhereThePositionIsAnEstimate) {
   const ToolAnswer text = ask("identify --run 1 --structure second_order");
   EXPECT_THAT(text.text, AllOf(HasSubstr("fitted: acceleration_m_s2; position_m and velocity_m_s are the robot's own"),
                                HasSubstr("sensor: ")));
+}
+
+TEST_F(RunTools, AnUncertaintyThatIsNotKnownIsNotCertainty) {
+  const storage::RunId run = begin();
+  robot_.context.position_sd_m = std::nullopt;
+  for (const double duty : {0.0, 0.4, -0.5, 0.6, -0.6, 0.3}) swim_on_the_accelerometer(100, duty);
+  flush();
+  const auto [of_run, of_csv] = from_run_and_csv(run);
+  EXPECT_EQ(of_run, of_csv);
+  EXPECT_EQ(of_run["channels"], nlohmann::json{"acceleration_m_s2"});
+  EXPECT_THAT(of_run["channels_reason"].get<std::string>(), HasSubstr("estimates (position_sd_m is not known)"));
+}
+
+TEST_F(RunTools, ACsvWhosePositionIsNotKnownToBeKnownNeedsTheAcceleration) {
+  std::ofstream{folder_ / "run.csv"} << "t_s,duty,position_m,position_sd_m\n0,0,0,0\n0.01,0.3,0,\n0.02,0.3,0,0\n";
+  EXPECT_THAT(cli::ask_tool(folder_, "identify --csv @run.csv").error,
+              AllOf(HasSubstr("position_sd_m is not known"), HasSubstr("there is no column acceleration_m_s2")));
+}
+
+TEST_F(RunTools, ADisturbanceIsTakenOffAMeasuredPositionToo) {
+  const storage::RunId run = begin();
+  swim(200, 0.3);
+  robot_.context.disturbance_m = -0.05F;
+  swim(200, -0.5);
+  flush();
+  write_csv(run, false);
+  const ToolAnswer answer = cli::ask_tool(folder_, "identify --csv @run.csv --structure fractional --json");
+  ASSERT_EQ(answer.exit_code, 0) << answer.error;
+  EXPECT_NEAR(answer.json()["parameters"]["kp"], 0.1, 1e-3);
+  EXPECT_THAT(answer.json()["channels_reason"].get<std::string>(), HasSubstr("less disturbance_m"));
 }
 
 TEST_F(RunTools, IdentifySaysHowMuchDeadTimeTheSensorsReadingsMayHide) {
@@ -365,7 +396,28 @@ TEST_F(RunTools, PredictRepeatsTheRunsStepAndDisturbance) {
   EXPECT_NEAR(json["experiment"]["disturbance_at_s"], 3, 1e-6);
   EXPECT_NEAR(json["experiment"]["duration_s"], 4.99, 1e-6);
   EXPECT_EQ(json["measured_steps"].size(), 2u);
-  EXPECT_THAT(ask("predict --run 1").text, HasSubstr("setpoint 0 to 0.2 m, measured"));
+  const std::string text = ask("predict --run 1").text;
+  EXPECT_THAT(text, HasSubstr("setpoint 0 to 0.2 m, measured"));
+  const std::string with =
+      "plant (29) of the paper, controller (30) of the paper, duty -1 to 1; if the run had others, give --plant and "
+      "--controller; the run's duty was never below 0: if its motor turns one way only, give --duty-min 0";
+  EXPECT_THAT(text, HasSubstr("\npredicted with: " + with + "\n\n"));
+  EXPECT_EQ(json["predicted_with"], with);
+  EXPECT_THAT(ask("predict --run 1 --plant newtonian --duty-min 0").text,
+              HasSubstr("predicted with: plant newtonian, controller (30) of the paper, duty 0 to 1; if the run had "
+                        "others, give --plant and --controller\n\n"));
+}
+
+TEST_F(RunTools, PredictDoesNotCallAPositionKnownWhoseUncertaintyIsNot) {
+  begin();
+  robot_.context.mode = rheonaut_MODE_AUTO;
+  robot_.context.setpoint_m = 0.2F;
+  robot_.context.position_sd_m = std::nullopt;
+  swim(300, 0.3);
+  flush();
+  const std::string text = ask("predict --run 1").text;
+  EXPECT_THAT(text, HasSubstr("compared with: the robot's own estimate (position_sd_m is not known)\n"));
+  EXPECT_THAT(text, HasSubstr(" ± not known"));
 }
 
 TEST_F(RunTools, PredictNeedsAStepInTheRun) {

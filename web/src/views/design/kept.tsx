@@ -136,6 +136,7 @@ function Ancestry({ design, designs }: { design: StoredDesign; designs: StoredDe
 }
 
 function Compared({ comparison }: { comparison: DesignComparison }) {
+  const together = comparison.together[1];
   return (
     <div class="design-scroll-x">
       <table class="design-table" id="design-comparison">
@@ -171,6 +172,12 @@ function Compared({ comparison }: { comparison: DesignComparison }) {
           ))}
         </tbody>
       </table>
+      {together && (
+        <p class="quiet">
+          All parameters together, with their correlations: chi-square {number_text(together.chi_square, 3)} with{' '}
+          {together.degrees_of_freedom} degrees of freedom, p = {number_text(together.p, 2)}.
+        </p>
+      )}
     </div>
   );
 }

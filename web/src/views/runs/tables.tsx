@@ -56,7 +56,7 @@ export function Steps({ page }: { page: RunPage }) {
     <section aria-label="Steps" id="steps">
       <h2>Steps</h2>
       {steps.length === 0 ? (
-        <p class="quiet">None: a step is a new setpoint or a disturbance in auto mode.</p>
+        <p class="quiet">None: a step is a new setpoint or a disturbance of 2 mm or more in auto mode.</p>
       ) : (
         <div class="wide-table" tabIndex={0} role="group" aria-label="Table of the steps">
           <table>
