@@ -11,10 +11,11 @@
 namespace server {
 
 constexpr microseconds kDay = 24h;
-using Rows = std::vector<std::string>;
 
 class RetentionTest : public RecordingTest {
  protected:
+  using Rows = std::vector<std::string>;
+
   void keep(std::uint32_t days, std::uint32_t megabytes = 0, std::uint32_t event_days = 0) {
     start({}, {.retention_days = days,
                .event_retention_days = event_days,
