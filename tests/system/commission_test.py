@@ -54,6 +54,11 @@ def found_in(record, step):
     return next(finding["found"] for finding in record["findings"] if finding["step"] == step)
 
 
+def has_stood_still(record):
+    """The machine had no time for the simulated robot, which then missed ticks where its duty changed."""
+    return any("samples are missing" in finding["found"] for finding in record["findings"])
+
+
 class CommissionTest(unittest.TestCase):
     """One station for all: two robots are commissioned to the end while others have their accidents."""
 
@@ -86,7 +91,7 @@ class CommissionTest(unittest.TestCase):
         for attempt in range(1, TRIES + 1):
             process, into = self.begun[robot]
             record, said = end(process, into)
-            if record and "it ended before its end" not in (record["unsigned_because"] or ""):
+            if record and "it ended before its end" not in (record["unsigned_because"] or "") and not has_stood_still(record):
                 return record, process.returncode, into
             self.reset(robot)
             self.begun[robot] = begin(self.place, robot, self.answers[robot], attempt)

@@ -64,8 +64,9 @@ TEST_F(HostileTest, SlowlorisIsEndedAfterTenSecondsHoweverItDrips) {
   std::vector<std::unique_ptr<RawClient>> drips;
   for (int i = 0; i < 60; ++i) {
     drips.push_back(dial());
-    drips.back()->send(i % 2 == 0 ? "GET / HTTP/1.1\r\nHost: localhost\r\nX-Filler: "
-                                  : head("POST /api/v1/runs", "Content-Length: 1000\r\n"));
+    drips.back()->send(i % 2 == 0
+                           ? "GET / HTTP/1.1\r\nHost: localhost\r\nX-Filler: "
+                           : head("POST /api/v1/runs", "Content-Type: application/json\r\nContent-Length: 1000\r\n"));
   }
   for (int second = 0; second < 11; ++second) {
     for (const auto& drip : drips) drip->send("x");

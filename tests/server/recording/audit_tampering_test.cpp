@@ -203,7 +203,7 @@ TEST_F(AuditTamperingTest, ACommandThatSaysSomethingElseThanItsEntryIsFound) {
               ::testing::Contains(HasSubstr("names entry 0")));
   EXPECT_THAT(after("INSERT INTO command SELECT 5, robot_id, boot_id, kind, arguments, actor, state, reason,"
                     " submitted_at_us, sent_at_us, ended_at_us, effect_at_robot_us, emergency_id, sent_after_us,"
-                    " acknowledged_after_us, verified_after_us, life_from, peer, NULL FROM command LIMIT 1")
+                    " acknowledged_after_us, verified_after_us, life_from, peer, NULL, NULL, NULL FROM command LIMIT 1")
                   .faults,
               ElementsAre(HasSubstr("1 commands have no entry in the audit")));
 }

@@ -119,7 +119,7 @@ TEST_F(ExportChildTest, OneThatBreaksOffIsAnErrorThatSaysHow) {
                                                           {"echo progress 1 2; kill -SEGV $$", "signal 11"},
                                                           {"exit 3", "status 3"},
                                                           {"exit 0", "status 0"},
-                                                          {"echo hello; sleep 600", "no line of its protocol"},
+                                                          {"echo hello; exec sleep 600", "no line of its protocol"},
                                                           {"yes | tr -d '\\n'", "no line of its protocol"}};
   for (const auto& [text, how] : programs) {
     SCOPED_TRACE(text);
@@ -143,7 +143,7 @@ TEST_F(ExportChildTest, OneThatIsNotThereOrNoProgramIsAnError) {
 }
 
 TEST_F(ExportChildTest, OneThatHangsIsEnded) {
-  for (const char* text : {"exec sleep 600", "echo progress 1 2; kill -STOP $$", "exec <&- >&- 2>&-; sleep 600"}) {
+  for (const char* text : {"exec sleep 600", "echo progress 1 2; kill -STOP $$", "exec <&- >&- 2>&-; exec sleep 600"}) {
     SCOPED_TRACE(text);
     const Error error = error_of(script(text, 300ms));
     EXPECT_EQ(error.code, ErrorCode::unavailable);

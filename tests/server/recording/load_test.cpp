@@ -55,7 +55,7 @@ TEST_F(LoadTest, ABootOfAHundredThousandSegmentsIsLoadedWithFewRows) {
   Work work;
   count(work);
   EXPECT_EQ(admit(robot_).durable_next_seq, 10'000'000u);
-  EXPECT_LE(work.statements, 12);
+  EXPECT_LE(work.statements, 13);
   EXPECT_LE(work.rows, 5);
   work = {};
   TestRobot rebooted;

@@ -62,7 +62,9 @@ export function describe({ event, command, note, position_sd_m }: LogLine): [ton
     const detail = event.detail ? ` · ${event.detail}` : '';
     const position = event.position_m === null ? '' : millimetres(event.position_m);
     const is_unknown = position_sd_m === null && event.kind !== 'position_zeroed'; // zeroed: it is 0 by command
-    const spread = is_unknown ? ' mm, ± not known' : position_sd_m ? ` ${plus_minus(position_sd_m)} mm` : ' mm';
+    // Where it is on its way, nothing is said of it yet.
+    const known = typeof position_sd_m === 'number' ? ` ${plus_minus(position_sd_m)} mm` : ' mm';
+    const spread = is_unknown ? ' mm, ± not known' : known;
     const at = position && ` · controller at ${position}${spread}`;
     const way_out = kWaysOut[event.kind] ? ` · ${kWaysOut[event.kind]}` : '';
     const caution = /lost|left_out|fault|limit|lapsed|uncertain|mismatch$/.test(event.kind);
