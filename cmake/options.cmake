@@ -9,7 +9,10 @@ target_compile_options(project_warnings INTERFACE
 # The dialect of code that also runs on the robot: no exceptions, no run-time types, no silent double arithmetic.
 add_library(firmware_dialect INTERFACE)
 target_compile_options(firmware_dialect INTERFACE
-  $<$<COMPILE_LANGUAGE:CXX>:-fno-exceptions -fno-rtti -Wdouble-promotion -Wfloat-conversion -ffp-contract=off>)
+  $<$<COMPILE_LANGUAGE:CXX>:-fno-exceptions -fno-rtti -Wdouble-promotion -Wfloat-conversion>)
+
+# A product and a sum are rounded one after the other on each processor, so that all of them compute the same digits.
+add_compile_options(-ffp-contract=off)
 
 # RHEONAUT_SANITIZE: a list for -fsanitize, empty for none. `enum` is left out because protobuf enumerators are open:
 # a newer peer may send a value that this version does not know. Checks of each pointer take a third of the compiler's
