@@ -2,9 +2,11 @@
 #include <arpa/inet.h>
 #include <fcntl.h>
 #include <netinet/in.h>
+#include <netinet/tcp.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <chrono>
 #include <future>
 #include <thread>
 
@@ -36,12 +38,23 @@ class QuietClient {
     const ssize_t size = ::recv(socket_, text.data(), text.size(), 0);
     return text.substr(0, size > 0 ? static_cast<std::size_t>(size) : 0);
   }
+  // Returns when the station's end of the connection knows it: on a busy machine that takes a moment.
   void leave() {
-    if (socket_ >= 0) ::close(socket_);
+    if (socket_ < 0) return;
+    ::shutdown(socket_, SHUT_WR);
+    const auto patience = std::chrono::steady_clock::now() + std::chrono::seconds{10};
+    while (is_end_unacknowledged() && std::chrono::steady_clock::now() < patience) std::this_thread::yield();
+    ::close(socket_);
     socket_ = -1;
   }
 
  private:
+  bool is_end_unacknowledged() const {
+    tcp_info info{};
+    socklen_t size = sizeof info;
+    return ::getsockopt(socket_, IPPROTO_TCP, TCP_INFO, &info, &size) == 0 && info.tcpi_state == TCP_FIN_WAIT1;
+  }
+
   int socket_;
 };
 
