@@ -61,6 +61,28 @@ class DemoTest(unittest.TestCase):
         with sqlite3.connect(f"file:{self.data / 'station.sqlite'}?mode=ro", uri=True) as database:
             self.assertEqual(1, database.execute("SELECT count(*) FROM run").fetchone()[0])
 
+    def test_a_program_gets_one_json_document_and_nothing_else_on_standard_output(self):
+        demo = [str(BIN / "rheonaut"), "demo", "--data", str(self.data), "--once", "--json"]
+        done = subprocess.run(demo, capture_output=True, text=True, timeout=WAIT_S)
+        document = json.loads(done.stdout)
+        self.assertEqual(["experiment", "steps", "samples_stored", "samples_lost", "database"], list(document))
+        self.assertIn("Experiment of Figure 7", done.stderr)
+        # A machine that stood still has the experiment aborted, as it must be.
+        self.assertEqual(0 if document["experiment"]["state"] == "done" else 5, done.returncode, done.stderr)
+        if done.returncode == 0:
+            self.assertEqual("setpoint", document["steps"][0]["cause"])
+            with sqlite3.connect(f"file:{document['database']}?mode=ro", uri=True) as database:
+                stored = database.execute("SELECT count(*) FROM run_sample WHERE run_id = 1").fetchone()[0]
+            self.assertEqual(stored, document["samples_stored"])
+            self.assertEqual(0, document["samples_lost"])
+        self.assertEqual([], running_in(self.data))
+
+    def test_json_is_for_a_demo_that_ends(self):
+        refused = subprocess.run([str(BIN / "rheonaut"), "demo", "--json"], cwd=self.folder, capture_output=True, text=True,
+                                 timeout=60)
+        self.assertEqual(2, refused.returncode)
+        self.assertIn("--once", refused.stderr)
+
     def test_an_interrupt_in_the_middle_of_the_experiment_ends_it(self):
         process = self.start()
         wait_until(lambda: "setpoint 100.0 mm" in self.said(), 100, "the robot on its way")

@@ -29,6 +29,7 @@ namespace server::cli {
 namespace {
 
 using nlohmann::json;
+using OrderedJson = nlohmann::ordered_json;
 
 constexpr const char* kRobot = "sim-1";
 constexpr const char* kFluid = "non_newtonian";  // equation (29)
@@ -61,10 +62,26 @@ class Patience {
   bool has_come_ = false;
 };
 
-void say(const std::string& line) {
-  fmt::print("{}\n", line);
-  std::fflush(stdout);
-}
+// What happens, at once: on standard output, or beside a JSON document on standard error.
+class Narrator {
+ public:
+  explicit Narrator(std::FILE* stream) : stream_{stream}, is_terminal_{::isatty(::fileno(stream)) != 0} {}
+  bool is_terminal() const { return is_terminal_; }
+  void say(const std::string& line) const { print(line + "\n"); }
+  void say_over_the_last(const std::string& line) const { print("\r\x1b[K" + line); }
+  void end_line() const {
+    if (is_terminal_) print("\n");
+  }
+
+ private:
+  void print(const std::string& text) const {
+    fmt::print(stream_, "{}", text);
+    std::fflush(stream_);
+  }
+
+  std::FILE* stream_;
+  bool is_terminal_;
+};
 
 std::string text_of_file(const std::filesystem::path& file) {
   std::ifstream in{file, std::ios::binary};
@@ -107,6 +124,7 @@ void send_model(const StationWork& station, Patience& patience) {
 // One line of where the robot is: on a terminal always the same line, otherwise once in two seconds.
 class Progress {
  public:
+  explicit Progress(const Narrator& narrator) : narrator_{narrator} {}
   void show(const json& experiment, const json& robot) {
     const json& progress = experiment.at("progress");
     const json& sample = robot.at("sample");
@@ -122,24 +140,21 @@ class Progress {
         "duty {:+.2f}",
         elapsed_s, 1e3 * setpoint_m, 1e3 * seen_m, 1e3 * estimate_m, 2e3 * robot.at("position_sd_m").get<double>(),
         sample.at("duty").get<double>());
-    if (is_terminal_) {
-      fmt::print("\r\x1b[K{}", line);
-      std::fflush(stdout);
+    if (narrator_.is_terminal()) {
+      narrator_.say_over_the_last(line);
     } else if (elapsed_s >= next_s_) {
-      say(line);
+      narrator_.say(line);
       next_s_ = elapsed_s + 2;
     }
   }
-  void end() const {
-    if (is_terminal_) fmt::print("\n");
-  }
+  void end() const { narrator_.end_line(); }
 
  private:
-  const bool is_terminal_ = ::isatty(STDOUT_FILENO) != 0;
+  const Narrator& narrator_;
   double next_s_ = 0;
 };
 
-void print_measures(const json& steps, const json& run) {
+void say_measures(const Narrator& narrator, const json& steps, const json& run) {
   Table table{{"step", "to (m)", "settling (s)", "overshoot (%)", "error (mm)", "± 2 sd (mm)"}};
   for (const json& step : steps) {
     const auto number = [&step](const char* name, double scale, int decimals) {
@@ -151,14 +166,20 @@ void print_measures(const json& steps, const json& run) {
   }
   std::ostringstream text;
   table.write(text);
-  say(text.str() + "(by the robot's estimate, which is how it steers)");
-  say(fmt::format("samples: {} recorded, {} lost", run.at("samples_stored").get<std::int64_t>(),
-                  run.at("samples_lost").get<std::int64_t>()));
+  narrator.say(text.str() + "(by the robot's estimate, which is how it steers)");
+  narrator.say(fmt::format("samples: {} recorded, {} lost", run.at("samples_stored").get<std::int64_t>(),
+                           run.at("samples_lost").get<std::int64_t>()));
 }
 
+struct Performed {
+  json experiment;                                   // as the station has it, ended
+  json steps = json::array(), run = json::object();  // of one that is done
+  bool is_done() const { return experiment.at("state") == "done"; }
+};
+
 // Figure 7. Gives signs of life while it lasts: when they end, the robot stops.
-int perform(const StationClient& client, Patience& patience) {
-  Progress progress;
+Performed perform(const StationClient& client, const Narrator& narrator, Patience& patience) {
+  Progress progress{narrator};
   const auto ask = [&client](const std::string& method, const std::string& target, const json& body) {
     return client.ask(method, target, body);
   };
@@ -169,17 +190,28 @@ int perform(const StationClient& client, Patience& patience) {
                             }};
   send_model(station, patience);
   const json begun = station.post("/api/v1/experiments", {{"robot_id", kRobot}, {"profile", "figure_7"}});
-  const json ended = station.finished_experiment(begun.at("experiment_id").get<std::int64_t>());
+  Performed performed{station.finished_experiment(begun.at("experiment_id").get<std::int64_t>())};
   progress.end();
-  if (ended.at("state") != "done") {
+  const json& ended = performed.experiment;
+  if (!performed.is_done()) {
     const json& detail = ended.at("detail");
-    say(fmt::format("The experiment is {}: {}", ended.at("state").get<std::string>(),
-                    detail.is_null() ? "no reason" : detail.get<std::string>()));
-    return kExperimentNotDone;
+    narrator.say(fmt::format("The experiment is {}: {}", ended.at("state").get<std::string>(),
+                             detail.is_null() ? "no reason" : detail.get<std::string>()));
+    return performed;
   }
   const std::string run = fmt::format("/api/v1/runs/{}", ended.at("runs").front().at("run_id").get<std::int64_t>());
-  print_measures(station.get(run + "/step-metrics").at("steps"), station.get(run));
-  return 0;
+  performed.steps = station.get(run + "/step-metrics").at("steps");
+  performed.run = station.get(run);
+  say_measures(narrator, performed.steps, performed.run);
+  return performed;
+}
+
+OrderedJson document(const Performed& performed, const std::filesystem::path& database) {
+  OrderedJson out{{"experiment", performed.experiment}, {"steps", performed.steps}};
+  out["samples_stored"] = performed.is_done() ? performed.run.at("samples_stored") : json{};
+  out["samples_lost"] = performed.is_done() ? performed.run.at("samples_lost") : json{};
+  out["database"] = database.string();
+  return out;
 }
 
 // A link for one page.
@@ -197,11 +229,16 @@ void add_options(CLI::App& command, Demo& options) {
                   "Folder for the station's files (default: rheonaut-demo); kept, and used again")
       ->check(named());
   command.add_option("--seed", options.seed, "Of the simulated sensors' noise (default: 21)");
-  command.add_flag("--once", options.is_once, "End after the experiment");
+  auto* once = command.add_flag("--once", options.is_once, "End after the experiment");
+  command
+      .add_flag("--json", options.is_json,
+                "With --once: print the experiment, its steps and the samples counted as JSON; all else goes to "
+                "standard error")
+      ->needs(once);
   command.footer("Example: rheonaut demo");
 }
 
-int run(const Demo& options, std::ostream&) {
+int run(const Demo& options, std::ostream& out) {
   config::make_data_folder(options.data_dir);
   const std::filesystem::path data = std::filesystem::absolute(options.data_dir);
   const std::filesystem::path endpoints = data / "endpoints.json", station_log = data / "station.log";
@@ -210,12 +247,14 @@ int run(const Demo& options, std::ostream&) {
     throw std::runtime_error{
         fmt::format("another station runs in '{}'; stop it, or choose another folder with --data", data.string())};
   }
+  const std::filesystem::path database = data / "station.sqlite";
+  const Narrator narrator{options.is_json ? stderr : stdout};
   int status = 0;
   Patience patience;
   try {
-    say("A station and a simulated robot start on this machine. The robot swims in the paper's fluid, equation (29), "
-        "and");
-    say("steers by its estimated position, as a real one does.");
+    narrator.say(
+        "A station and a simulated robot start on this machine. The robot swims in the paper's fluid, equation (29), "
+        "and\nsteers by its estimated position, as a real one does.");
     ChildProgram station{own_folder() / "rheonaut", {"serve", "--data", data.string()}, station_log};
     std::optional<StationClient> client;
     wait_for("the station", station, station_log, patience, [&] {
@@ -226,7 +265,7 @@ int run(const Demo& options, std::ostream&) {
     });
     const json addresses = json::parse(text_of_file(endpoints));
     const auto robots = addresses.at("robots").get<std::string>();
-    say(fmt::format("\npage: {}\n      (a link for one browser, once)\n", login_link(*client)));
+    narrator.say(fmt::format("\npage: {}\n      (a link for one browser, once)\n", login_link(*client)));
     ChildProgram robot{own_folder() / "rheonaut-sim",
                        {"--station", robots, "--id", kRobot, "--seed", std::to_string(options.seed)},
                        robot_log};
@@ -234,20 +273,24 @@ int run(const Demo& options, std::ostream&) {
       const StationAnswer answer = client->ask("GET", fmt::format("/api/v1/robots/{}", kRobot));
       return answer.status == 200 && answer.body.at("link") == "connected" && !answer.body.at("sample").is_null();
     });
-    say("Experiment of Figure 7: to 0.1 m, after 20 s the measured position is shifted by -0.05 m, 40 s in all.");
-    status = perform(*client, patience);
-    say(fmt::format("\nEverything is recorded in {}", (data / "station.sqlite").string()));
+    narrator.say(
+        "Experiment of Figure 7: to 0.1 m, after 20 s the measured position is shifted by -0.05 m, 40 s in all.");
+    const Performed performed = perform(*client, narrator, patience);
+    if (!performed.is_done()) status = kExperimentNotDone;
+    narrator.say(fmt::format("\nEverything is recorded in {}", database.string()));
+    if (options.is_json) write_json(out, document(performed, database));
     if (!options.is_once) {
-      say(fmt::format("The station and the robot stay up: drive the robot on the page. Ctrl-C ends both.\npage: {}",
+      narrator.say(
+          fmt::format("The station and the robot stay up: drive the robot on the page. Ctrl-C ends both.\npage: {}",
                       login_link(*client)));
       while (!station.has_ended()) patience.wait(kLook);
       throw std::runtime_error{fmt::format("the station has ended; its output is in '{}'", station_log.string())};
     }
   } catch (const Interrupted&) {
-    say("\nended");
+    narrator.say("\nended");
   } catch (const std::exception&) {
     if (!patience.is_interrupted()) throw;
-    say("\nended");  // the signal broke a request off
+    narrator.say("\nended");  // the signal broke a request off
   }
   return status;
 }

@@ -16,12 +16,14 @@ struct Demo {
   std::filesystem::path data_dir = "rheonaut-demo";
   std::uint32_t seed = 21;  // of the simulated sensors' noise
   bool is_once = false;
+  bool is_json = false;  // with is_once
 };
 
 void add_options(CLI::App& command, Demo& options);
 
 // Starts both programs, prints a link to the page, performs the experiment and prints what was measured; then it waits
-// for SIGINT or SIGTERM, unless is_once, and ends both. What happens is printed at once. 0, or kExperimentNotDone.
+// for SIGINT or SIGTERM, unless is_once, and ends both. What happens is printed at once, with is_json on standard error
+// and one document on `out` at the end. 0, or kExperimentNotDone.
 // Throws std::runtime_error saying what did not start.
 int run(const Demo& options, std::ostream& out);
 
