@@ -21,6 +21,9 @@ void check(const TuningSpec& spec) {
     refuse("phase_margin_deg must lie in (0, 180), is", spec.phase_margin_deg);
   }
   if (spec.mu && !(*spec.mu > 0 && *spec.mu < 2)) refuse("mu must lie in (0, 2), is", *spec.mu);
+  if (!(spec.period_s >= 0 && std::isfinite(spec.period_s))) {
+    refuse("period_s must be 0 or positive, is", spec.period_s);
+  }
 }
 
 std::string name_of(const TuningSpec& spec) {
@@ -37,7 +40,14 @@ std::string why_not_sound(const TunedController& design) {
   text.precision(6);
   text << "kp = " << kp << ", kd = " << kd << ", mu = " << mu << " meets it at " << design.spec.gain_crossover_rad_s
        << " rad/s, but ";
-  if (!achieved.is_closed_loop_stable) text << "the closed loop is unstable";
+  if (!achieved.is_closed_loop_stable) {
+    text << "the closed loop is unstable";
+  } else if (!design.sampled.is_closed_loop_stable) {
+    text << "the closed loop is unstable as the robot runs it, which holds its duty for " << design.spec.period_s
+         << " s: of the phase margin of " << *achieved.phase_margin_deg << " degrees that takes "
+         << design.spec.gain_crossover_rad_s * design.spec.period_s / 2 * kDegPerRad;
+    return text.str();
+  }
   if (is_ruled_elsewhere(design)) {
     text << (achieved.is_closed_loop_stable ? "" : ": ") << "the gain is 1 also at " << *achieved.gain_crossover_rad_s
          << " rad/s, where the phase margin is " << *achieved.phase_margin_deg << " degrees";

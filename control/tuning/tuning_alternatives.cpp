@@ -172,7 +172,10 @@ TunedController tuned_controller(const FractionalModel& plant, const TuningSpec&
   const PlantOnAxis on_axis{plant, spec.is_velocity_loop};
   const TuningDemand demand = tuning_demand(on_axis, std::log(spec.gain_crossover_rad_s), spec.phase_margin_deg);
   const FopdController controller = controller_for(demand, mu);
-  return {std::move(name), spec, controller, margins({plant, controller, spec.is_velocity_loop})};
+  const Margins achieved = margins({plant, controller, spec.is_velocity_loop});
+  if (spec.period_s == 0) return {std::move(name), spec, controller, achieved, achieved};
+  const FractionalModel held = with_hold(plant, spec.period_s);
+  return {std::move(name), spec, controller, achieved, margins({held, controller, spec.is_velocity_loop})};
 }
 
 std::vector<PhaseMarginRange> sound_phase_margins(const FractionalModel& plant, const TuningSpec& spec) {

@@ -33,10 +33,12 @@ MapReason why_none(const std::optional<PhaseMarginRange>& solved) {
   return solved->low_deg >= 180 ? MapReason::margin_above_180 : MapReason::not_sound;
 }
 
-TuningMapPoint point_at(const FractionalModel& plant, double omega_rad_s, bool is_velocity_loop) {
+TuningMapPoint point_at(const FractionalModel& plant, double omega_rad_s, const TuningMapSpec& of_map) {
+  const bool is_velocity_loop = of_map.is_velocity_loop;
   TuningSpec spec;
   spec.gain_crossover_rad_s = omega_rad_s;
   spec.is_velocity_loop = is_velocity_loop;
+  spec.period_s = of_map.period_s;
   TuningMapPoint point;
   point.gain_crossover_rad_s = omega_rad_s;
   point.phase_fall = tuning_demand(PlantOnAxis{plant, is_velocity_loop}, std::log(omega_rad_s), 0).phase_fall;
@@ -54,7 +56,7 @@ std::vector<TuningMapPoint> tuning_map(const FractionalModel& plant, const Tunin
   std::vector<TuningMapPoint> map;
   for (int i = 0; i < spec.points; ++i) {
     if (goes_on && !goes_on(static_cast<double>(i) / spec.points)) break;
-    map.push_back(point_at(plant, crossover_of(spec, i), spec.is_velocity_loop));
+    map.push_back(point_at(plant, crossover_of(spec, i), spec));
   }
   return map;
 }

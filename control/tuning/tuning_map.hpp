@@ -24,6 +24,7 @@ struct TuningMapSpec {
   double to_rad_s = 50;  // above from_rad_s
   int points = 60;       // 2 to kMostMapPoints
   bool is_velocity_loop = false;
+  double period_s = 0;  // as in TuningSpec
 };
 
 inline constexpr int kMostMapPoints = 500;

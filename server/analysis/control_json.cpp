@@ -257,7 +257,8 @@ OrderedJson json_of(const control::TunedController& tuned) {
           {"kp", tuned.controller.kp},
           {"kd", tuned.controller.kd},
           {"mu", tuned.controller.mu},
-          {"achieved", json_of(tuned.achieved)}};
+          {"achieved", json_of(tuned.achieved)},
+          {"sampled", json_of(tuned.sampled)}};
 }
 
 OrderedJson json_of(const control::TuningResult& result) {
@@ -265,6 +266,7 @@ OrderedJson json_of(const control::TuningResult& result) {
   if (result.tuned) {
     out.update(json_of(result.tuned->controller));
     out["achieved"] = json_of(result.tuned->achieved);
+    out["sampled"] = json_of(result.tuned->sampled);
   } else {
     out["reason"] = result.reason;
     const auto& offered = result.nearest.empty() ? result.relaxed : result.nearest;

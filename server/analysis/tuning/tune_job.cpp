@@ -32,9 +32,10 @@ void add_controller(const TuneRequest& request, const control::FopdController& c
 
 std::string compute_tuning(const TuneRequest& request, storage::JobRun& run) {
   run.report(0, "tuning");
-  const control::TuningResult result = control::tune(request.plant, request.spec);
-  OrderedJson answer =
-      tuning_json(request.plant, request.spec, result, control::sound_phase_margins(request.plant, request.spec));
+  control::TuningSpec spec = request.spec;
+  spec.period_s = request.period_s;
+  const control::TuningResult result = control::tune(request.plant, spec);
+  OrderedJson answer = tuning_json(request.plant, spec, result, control::sound_phase_margins(request.plant, spec));
   answer["plant_source"] = request.plant_source;
   if (result.tuned) add_controller(request, result.tuned->controller, run, answer);
   return answer.dump();
@@ -45,8 +46,9 @@ std::string compute_map(const TuningMapRequest& request, storage::JobRun& run) {
     run.report(share, "looking for sound designs");
     return !run.is_cancelled();
   };
-  OrderedJson answer =
-      tuning_map_json(request.plant, request.spec, control::tuning_map(request.plant, request.spec, goes_on));
+  control::TuningMapSpec spec = request.spec;
+  spec.period_s = Sampling{}.period_s;
+  OrderedJson answer = tuning_map_json(request.plant, spec, control::tuning_map(request.plant, spec, goes_on));
   answer["plant_source"] = request.plant_source;
   return answer.dump();
 }

@@ -34,7 +34,8 @@ OrderedJson tuning_json(const control::FractionalModel& plant, const control::Tu
   answer["asked"] = {{"crossover_rad_s", spec.gain_crossover_rad_s},
                      {"phase_margin_deg", spec.phase_margin_deg},
                      {"mu", or_null(spec.mu)},
-                     {"velocity_loop", spec.is_velocity_loop}};
+                     {"velocity_loop", spec.is_velocity_loop},
+                     {"period_s", spec.period_s}};
   answer["plant"] = json_of(plant);
   return answer;
 }
@@ -57,7 +58,8 @@ OrderedJson tuning_map_json(const control::FractionalModel& plant, const control
   out["asked"] = {{"from_rad_s", spec.from_rad_s},
                   {"to_rad_s", spec.to_rad_s},
                   {"points", spec.points},
-                  {"velocity_loop", spec.is_velocity_loop}};
+                  {"velocity_loop", spec.is_velocity_loop},
+                  {"period_s", spec.period_s}};
   out["plant"] = json_of(plant);
   return out;
 }

@@ -5,6 +5,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "control/tuning/design.hpp"
 #include "server/analysis/control_json.hpp"
 #include "server/cli/terminal/exit_status.hpp"
 #include "server/cli/terminal/options.hpp"
@@ -39,12 +40,61 @@ std::string list(std::span<const double> values) {
   return text.empty() ? "-" : text;
 }
 
+struct BothMargins {
+  control::Margins continuous, sampled;
+};
+
+BothMargins margins_of(const Bode& options, control::OpenLoop loop) {
+  BothMargins both{control::margins(loop), {}};
+  loop.plant = control::with_hold(loop.plant, options.period_s);
+  both.sampled = control::margins(loop);
+  return both;
+}
+
+void write_margins(std::ostream& out, const Bode& options, const BothMargins& both) {
+  const auto& [margins, sampled] = both;
+  Table table{{"open loop", "continuous", "as the robot runs it", "<unit"}};
+  const auto row = [&](const char* name, const std::string& of_loop, const std::string& of_robot,
+                       const std::string& unit) { table.row({name, of_loop, of_robot, unit}); };
+  const auto peak = [](double value, double at_rad_s) { return fmt::format("{} at {:.4g}", cell(value, 5), at_rad_s); };
+  const auto gain_margin = [](const control::Margins& of) {
+    return of.gain_margin_db ? cell(*of.gain_margin_db) : "infinite";
+  };
+  row("gain crossover", cell(margins.gain_crossover_rad_s, 8), cell(sampled.gain_crossover_rad_s, 8), "rad/s");
+  row("phase margin", cell(margins.phase_margin_deg, 8), cell(sampled.phase_margin_deg, 8), "deg");
+  row("phase slope there", cell(margins.phase_slope_deg_per_rad_s, 6), cell(sampled.phase_slope_deg_per_rad_s, 6),
+      "deg/(rad/s)");
+  row("gain margin", gain_margin(margins), gain_margin(sampled), "dB");
+  row("Ms, largest |1/(1+L)|", peak(margins.ms, margins.ms_at_rad_s), peak(sampled.ms, sampled.ms_at_rad_s), "rad/s");
+  row("Mt, largest |L/(1+L)|", peak(margins.mt, margins.mt_at_rad_s), peak(sampled.mt, sampled.mt_at_rad_s), "rad/s");
+  const auto lists = [&](const char* name, const std::vector<double>& of_loop, const std::vector<double>& of_robot) {
+    row(name, list(of_loop), list(of_robot), "rad/s");
+  };
+  if (margins.gain_crossovers_rad_s.size() > 1) {
+    lists("all gain crossovers", margins.gain_crossovers_rad_s, sampled.gain_crossovers_rad_s);
+  }
+  if (!margins.phase_crossovers_rad_s.empty()) {
+    lists("phase crossovers", margins.phase_crossovers_rad_s, sampled.phase_crossovers_rad_s);
+  }
+  table.write(out);
+  if (!margins.is_closed_loop_stable) {
+    out << "the closed loop is UNSTABLE: these numbers are no margins\n";
+  } else if (!sampled.is_closed_loop_stable) {
+    fmt::print(out, "the closed loop is UNSTABLE as a robot runs it that holds its duty for {:g} s\n",
+               options.period_s);
+  }
+}
+
 }  // namespace
 
 void add_options(CLI::App& command, Bode& options) {
   add_option(command, options.plant);
   add_option(command, options.controller);
   command.add_flag("--velocity-loop", options.is_velocity_loop, "Without the integrator from velocity to position");
+  command
+      .add_option("--period-s", options.period_s,
+                  "For how long the robot holds its duty; 0: not sampled (default: 0.01)")
+      ->check(non_negative());
   command.add_option("--from-rad-s", options.from_rad_s, "First frequency of the response (default: 0.1)")
       ->check(positive());
   command.add_option("--to-rad-s", options.to_rad_s, "Last frequency (default: 1000)")->check(positive());
@@ -55,26 +105,9 @@ void add_options(CLI::App& command, Bode& options) {
       ->check(whole(2, kMaxPoints));
   add_json_and_csv_flags(command, options.form);
   command.footer(
-      "The margins are those of the open loop, plant times controller.\n"
+      "The margins are those of the open loop, plant times controller: continuous, as in the paper, and as the robot\n"
+      "runs it, which holds its duty for a period. Half a period counts as dead time.\n"
       "Example: rheonaut bode --plant newtonian --from-rad-s 1 --to-rad-s 100");
-}
-
-void write_margins(std::ostream& out, const control::Margins& margins) {
-  Table table{{"open loop", "value", "<unit"}};
-  table.row({"gain crossover", cell(margins.gain_crossover_rad_s, 8), "rad/s"});
-  table.row({"phase margin", cell(margins.phase_margin_deg, 8), "deg"});
-  table.row({"phase slope there", cell(margins.phase_slope_deg_per_rad_s, 6), "deg/(rad/s)"});
-  table.row({"gain margin", margins.gain_margin_db ? cell(*margins.gain_margin_db) : "infinite", "dB"});
-  table.row({"Ms, largest |1/(1+L)|", cell(margins.ms, 5), fmt::format("at {:.4g} rad/s", margins.ms_at_rad_s)});
-  table.row({"Mt, largest |L/(1+L)|", cell(margins.mt, 5), fmt::format("at {:.4g} rad/s", margins.mt_at_rad_s)});
-  if (margins.gain_crossovers_rad_s.size() > 1) {
-    table.row({"all gain crossovers", list(margins.gain_crossovers_rad_s), "rad/s"});
-  }
-  if (!margins.phase_crossovers_rad_s.empty()) {
-    table.row({"phase crossovers", list(margins.phase_crossovers_rad_s), "rad/s"});
-  }
-  table.write(out);
-  if (!margins.is_closed_loop_stable) out << "the closed loop is UNSTABLE: these numbers are no margins\n";
 }
 
 int run(const Bode& options, std::ostream& out) {
@@ -83,12 +116,14 @@ int run(const Bode& options, std::ostream& out) {
     write_points(out, response(options, loop, options.points.value_or(kCsvPoints)));
     return 0;
   }
-  const control::Margins margins = control::margins(loop);
+  const BothMargins margins = margins_of(options, loop);
   if (options.form.is_json) {
     if (!options.points && (options.from_rad_s || options.to_rad_s)) {
       throw UsageError{"--from-rad-s and --to-rad-s belong to the response, which --json has with --points"};
     }
-    analysis::OrderedJson answer = analysis::json_of(margins);
+    analysis::OrderedJson answer = analysis::json_of(margins.continuous);
+    answer["sampled"] = analysis::json_of(margins.sampled);
+    answer["sampled"]["period_s"] = options.period_s;
     answer["plant"] = analysis::json_of(loop.plant);
     answer["controller"] = analysis::json_of(loop.controller);
     answer["velocity_loop"] = options.is_velocity_loop;
@@ -98,7 +133,7 @@ int run(const Bode& options, std::ostream& out) {
     write_json(out, answer);
     return 0;
   }
-  write_margins(out, margins);
+  write_margins(out, options, margins);
   out << '\n';
   Table table{{"omega (rad/s)", "magnitude (dB)", "phase (deg)"}};
   for (const auto& point : response(options, loop, options.points.value_or(kTablePoints))) {

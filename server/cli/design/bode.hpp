@@ -13,6 +13,7 @@ struct Bode {
   PlantChoice plant;
   ControllerChoice controller;
   bool is_velocity_loop = false;
+  double period_s = 0.01;                      // of the robot that runs the controller
   std::optional<double> from_rad_s, to_rad_s;  // of the response; none: 0.1 to 1000
   std::optional<int> points;
   OutputForm form;
@@ -20,8 +21,5 @@ struct Bode {
 
 void add_options(CLI::App& command, Bode& options);
 int run(const Bode& options, std::ostream& out);
-
-// Lines of name, value and unit; also for what a tuning achieved.
-void write_margins(std::ostream& out, const control::Margins& margins);
 
 }  // namespace server::cli

@@ -12,7 +12,7 @@ inline constexpr int kInfeasible = 3;  // exit status
 
 struct Tune {
   PlantChoice plant;
-  control::TuningSpec spec;
+  control::TuningSpec spec{5, 91, std::nullopt, false, 0.01};
   bool with_robustness = false;
   bool is_map = false;  // instead of a controller
   control::TuningMapSpec map;

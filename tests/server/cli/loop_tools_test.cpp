@@ -169,6 +169,28 @@ TEST_F(LoopTools, TuneNeedsASpecificationUnlessAMapIsAskedFor) {
   EXPECT_THAT(ask("tune --map --from-rad-s 5 --to-rad-s 2").error, HasSubstr("to_rad_s must be above from_rad_s"));
 }
 
+TEST_F(LoopTools, BodeAndTuneSayWhatTheHoldOfTheDutyCosts) {
+  const auto bode = ask("bode --json").json();
+  EXPECT_NEAR(bode["phase_margin_deg"], 65.00, 0.01) << "the paper's, of the continuous loop";
+  EXPECT_EQ(bode["gain_margin_db"], nullptr);
+  EXPECT_NEAR(bode["sampled"]["phase_margin_deg"], 63.28, 0.01);
+  EXPECT_NEAR(bode["sampled"]["gain_margin_db"], 19.4, 0.2);
+  EXPECT_EQ(bode["sampled"]["period_s"], 0.01);
+  EXPECT_NEAR(ask("bode --period-s 0 --json").json()["sampled"]["phase_margin_deg"], 65.00, 0.01);
+  EXPECT_THAT(ask("bode").text, HasSubstr("as the robot runs it"));
+  const auto tuned = ask("tune --crossover-rad-s 5 --phase-margin-deg 91 --json").json();
+  EXPECT_NEAR(tuned["sampled"]["phase_margin_deg"], 89.57, 0.01);
+  EXPECT_EQ(tuned["asked"]["period_s"], 0.01);
+  const Answer refused = ask("tune --crossover-rad-s 60 --phase-margin-deg 15");
+  EXPECT_EQ(refused.exit_code, 3);
+  EXPECT_THAT(refused.text, HasSubstr("unstable as the robot runs it"));
+  EXPECT_EQ(ask("tune --crossover-rad-s 60 --phase-margin-deg 15 --period-s 0").exit_code, 0);
+  const auto unsampled = ask("tune --map --from-rad-s 58 --to-rad-s 70 --points 2 --period-s 0 --json").json();
+  const auto sampled = ask("tune --map --from-rad-s 58 --to-rad-s 70 --points 2 --json").json();
+  EXPECT_LT(unsampled["points"][1]["lowest_phase_margin_deg"].get<double>() + 5,
+            sampled["points"][1]["lowest_phase_margin_deg"].get<double>());
+}
+
 TEST_F(LoopTools, TuneTableShowsAskedBesideAchieved) {
   const Answer answer = ask("tune --crossover-rad-s 5 --phase-margin-deg 91");
   EXPECT_THAT(answer.text, HasSubstr("asked"));

@@ -97,6 +97,7 @@ export interface Predicted {
 export interface Near extends Law, Specification {
   name: string;
   achieved: Achieved;
+  sampled: Achieved; // as the robot runs it, which holds its duty for a period
 }
 
 export interface RobustnessRow {
@@ -113,6 +114,7 @@ export interface Tuned extends Law {
   feasible: boolean;
   reason?: string;
   achieved: Achieved;
+  sampled: Achieved;
   nearest_all: Near[];
   relaxed: Near[];
   asked: Specification;

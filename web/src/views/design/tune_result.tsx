@@ -2,7 +2,7 @@
 
 import type { Fluid } from '../../api';
 import { fluid_text, millimetres, percent } from '../../format';
-import type { Measures, Near, RobustnessRow, Tuned } from './design_api';
+import type { Achieved, Measures, Near, RobustnessRow, Tuned } from './design_api';
 import { rounded } from './ask';
 import type { Solution, Specification } from './frequency';
 import { curve_name } from './step_plots';
@@ -18,6 +18,7 @@ interface AchievementProps {
 
 export function Achievement({ asked, tuned, own, is_dragged, on_ask }: AchievementProps) {
   const achieved = tuned?.feasible ? tuned.achieved : null;
+  const sampled = tuned?.feasible ? tuned.sampled : null;
   const law = tuned?.feasible ? tuned : own?.law;
   return (
     <>
@@ -38,24 +39,43 @@ export function Achievement({ asked, tuned, own, is_dragged, on_ask }: Achieveme
             <th scope="col" class="number">
               Achieved
             </th>
+            <th
+              scope="col"
+              class="number"
+              title="The robot holds its duty for a period; half of it counts as dead time"
+            >
+              On the robot
+            </th>
           </tr>
         </thead>
         <tbody>
-          <Line name="Crossover, rad/s" asked={number_text(asked.crossover_rad_s)}>
-            {fixed_text(achieved?.gain_crossover_rad_s, 3)}
-          </Line>
-          <Line name="Phase margin, °" asked={number_text(asked.phase_margin_deg)}>
-            {fixed_text(achieved?.phase_margin_deg, 2)}
-          </Line>
-          <Line name="Phase slope, °/(rad/s)" asked="0">
-            {achieved ? fixed_text(achieved.phase_slope_deg_per_rad_s, 4) : '–'}
-          </Line>
-          <Line name="Ms, Mt" asked="">
-            {achieved ? `${fixed_text(achieved.ms, 3)}, ${fixed_text(achieved.mt, 3)}` : '–'}
-          </Line>
+          <Line
+            name="Crossover, rad/s"
+            asked={number_text(asked.crossover_rad_s)}
+            of={[achieved, sampled]}
+            text={({ gain_crossover_rad_s }) => fixed_text(gain_crossover_rad_s, 3)}
+          />
+          <Line
+            name="Phase margin, °"
+            asked={number_text(asked.phase_margin_deg)}
+            of={[achieved, sampled]}
+            text={({ phase_margin_deg }) => fixed_text(phase_margin_deg, 2)}
+          />
+          <Line
+            name="Phase slope, °/(rad/s)"
+            asked="0"
+            of={[achieved, sampled]}
+            text={({ phase_slope_deg_per_rad_s }) => fixed_text(phase_slope_deg_per_rad_s, 4)}
+          />
+          <Line
+            name="Ms, Mt"
+            asked=""
+            of={[achieved, sampled]}
+            text={({ ms, mt }) => `${fixed_text(ms, 3)}, ${fixed_text(mt, 3)}`}
+          />
           <tr>
             <th scope="row">Controller</th>
-            <td colSpan={2} class="number" id="design-law">
+            <td colSpan={3} class="number" id="design-law">
               {law ? `kp ${number_text(law.kp, 5)}, kd ${number_text(law.kd, 4)}, μ ${fixed_text(law.mu, 4)}` : 'none'}
             </td>
           </tr>
@@ -73,11 +93,22 @@ export function Achievement({ asked, tuned, own, is_dragged, on_ask }: Achieveme
   );
 }
 
-const Line = ({ name, asked, children }: { name: string; asked: string; children: string }) => (
+interface LineProps {
+  name: string;
+  asked: string;
+  of: readonly (Achieved | null)[];
+  text(margins: Achieved): string;
+}
+
+const Line = ({ name, asked, of, text }: LineProps) => (
   <tr>
     <th scope="row">{name}</th>
     <td class="number commanded">{asked}</td>
-    <td class="number value">{children}</td>
+    {of.map((margins, at) => (
+      <td key={at} class="number value">
+        {margins ? text(margins) : '–'}
+      </td>
+    ))}
   </tr>
 );
 
