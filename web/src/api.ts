@@ -64,6 +64,11 @@ export class ApiError extends Error {
   }
 }
 
+// Whether the station itself has dealt with what it was asked. A proxy in front of it answers without a `reason`; a station
+// that is too busy, or not ready, has not looked at it. Its own 504 has one: the command was sent, and the robot is silent.
+export const is_answer_of_station = (error: unknown): boolean =>
+  error instanceof ApiError && error.reason !== '' && ![0, 429, 502, 503].includes(error.status);
+
 export type Fetch = (path: string, options: RequestInit) => Promise<Response>;
 
 const kOverviewChannels = [
@@ -237,7 +242,7 @@ const query_of = (query: Record<string, number | string>) => {
 
 function error_of(status: number, problem: Partial<Problem> | null, retry_after_s: number): ApiError {
   const reason = problem?.reason ?? '';
-  if (status === 429)
+  if (reason === 'throttled')
     return new ApiError(`Too many attempts. Try again in ${retry_after_s} s.`, status, reason, '', problem);
   const known = allowed_range(problem?.detail ?? '') ?? kReasons[reason];
   const otherwise = problem?.detail || problem?.title || `The station answered ${status} without a reason.`;

@@ -128,8 +128,18 @@ export class EmergencyStop {
     if (next !== phase) this.show({ ...this.state, phase: next });
   }
 
-  // The latch was cleared: the last stop is history.
-  forget(): void {
+  // The newest press; with it a clear says later which stop it was begun under.
+  get newest_press(): number {
+    return this.press;
+  }
+
+  // A latch of this robot was cleared: its stop is history.
+  // SAFETY: not a press that came after the clear was begun, not the stop of another robot, and never one of all robots.
+  cleared(robot_id: string, press_before: number): void {
+    if (press_before === this.press && this.state.robot_id === robot_id) this.forget();
+  }
+
+  private forget(): void {
     this.press += 1;
     this.kept.delete(this.state.robot_id);
     this.show(kIdleStop);

@@ -4,6 +4,7 @@ import { effect, signal, untracked } from '@preact/signals';
 import {
   Api,
   ApiError,
+  is_answer_of_station,
   type EventRecord,
   type Fluid,
   type LiveMessage,
@@ -96,7 +97,7 @@ export class Session {
       over_http: (robot_id, key) =>
         robot_id === null ? this.api.emergency_stop_all(key) : this.api.emergency_stop(robot_id, key),
       evidence: (robot_id, since_ms) => this.store.stop_evidence(robot_id, since_ms),
-      was_answered: (error) => error instanceof ApiError && error.status !== 0,
+      was_answered: is_answer_of_station,
       now_ms: () => performance.now(),
       on_change: (state) => (this.stop_state.value = state),
     });

@@ -43,6 +43,13 @@ test('an unknown refusal is said in the words of the station', async () => {
   expect((await failure(api.set_setpoint('rheo-1', 4))).message).toBe('the tide is out');
 });
 
+test('only a sign-in that has to wait says that there were too many attempts', async () => {
+  const throttled = api_that_answers(429, { detail: 'wait', reason: 'throttled' }).api;
+  expect((await failure(throttled.log_in('a', 'b'))).message).toMatch(/^Too many attempts/);
+  const busy = api_that_answers(429, { detail: 'your address has as many connections', reason: 'too_many_pages' }).api;
+  expect((await failure(busy.set_manual('rheo-1'))).message).toBe('your address has as many connections');
+});
+
 test('an answer that is no JSON is an error with its status', async () => {
   const { api } = api_that_answers(502, null);
   expect((await failure(api.set_manual('rheo-1'))).message).toContain('502');

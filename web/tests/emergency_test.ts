@@ -151,6 +151,38 @@ test('that a robot was stopped is no longer said when its latch is gone', async 
   expect(emergency.state.phase).toBe('idle');
 });
 
+// SAFETY: what may not have arrived stays on the screen, and goes again, whatever else is cleared.
+test('that one robot is cleared takes away no stop of all robots, and none of another robot', async () => {
+  for (const stopped of [null, 'r5']) {
+    const { emergency, world } = stop_with(() => Promise.reject(new Error('The station did not answer.')));
+    await emergency.stop(stopped);
+    emergency.cleared('r1', emergency.newest_press);
+    expect(emergency.state).toMatchObject({ phase: 'failed', robot_id: stopped });
+    emergency.again();
+    expect(world.ways.slice(2)).toEqual([`socket ${stopped}`, `http ${stopped}`]);
+  }
+});
+
+test('a press while a clear is on its way outlives the answer to the clear', async () => {
+  const { emergency, world } = stop_with(() => Promise.reject(new Error('The station did not answer.')));
+  await emergency.stop('r1');
+  const before = emergency.newest_press;
+  await emergency.stop('r1');
+  emergency.cleared('r1', before);
+  expect(emergency.state).toMatchObject({ phase: 'failed', is_kept: true });
+  emergency.again();
+  expect(world.ways).toHaveLength(6);
+});
+
+test('the stop of the robot that is cleared is history', async () => {
+  const { emergency, world } = stop_with(() => Promise.reject(new Error('The station did not answer.')));
+  await emergency.stop('r1');
+  emergency.cleared('r1', emergency.newest_press);
+  expect(emergency.state.phase).toBe('idle');
+  emergency.again();
+  expect(world.ways).toHaveLength(2);
+});
+
 function press(key: string, change: Partial<KeyboardEvent> = {}) {
   let stops = 0;
   let listener: (event: KeyboardEvent) => void = () => undefined;

@@ -33,6 +33,28 @@ test('a robot that was stopped, or sent anything, stays selected when another on
   }
 });
 
+// SAFETY: while the station restarts, a proxy in front of it answers in its place.
+test('a stop that only a proxy, or a station that is too busy, has answered goes again; one that the station refused does not', async () => {
+  const problem = (status: number, reason: string) => new Response(JSON.stringify({ status, reason }), { status });
+  const answers: [Response, boolean][] = [
+    [new Response('<h1>Bad Gateway</h1>', { status: 502 }), true],
+    [new Response('<h1>Unavailable</h1>', { status: 503 }), true],
+    [new Response('<h1>Time-out</h1>', { status: 504 }), true],
+    [new Response('<h1>Too many</h1>', { status: 429 }), true],
+    [new Response('<h1>Sign in to the network</h1>'), true],
+    [problem(503, 'busy'), true],
+    [problem(429, 'busy'), true],
+    [problem(504, 'no_answer'), false], // it was sent
+    [problem(403, 'not_permitted'), false],
+  ];
+  for (const [answer, is_kept] of answers) {
+    const session = session_beside(robot('a', 'connected'));
+    vi.stubGlobal('fetch', () => Promise.resolve(answer));
+    await session.emergency.stop('a');
+    expect([answer.status, session.stop_state.value.is_kept]).toEqual([answer.status, is_kept]);
+  }
+});
+
 test('what a page asks chooses no robot', async () => {
   const session = session_beside(robot('a', 'disconnected'));
   await session.api.newest_run('a').catch(() => undefined);

@@ -41,6 +41,8 @@ function drawn_with(state: RobotState) {
   store.refresh();
   const cleared: string[] = [];
   const pressed: string[] = [];
+  const forgotten: [string, number][] = []; // robot and press that the latch hands on when it is cleared
+  const emergency = { newest_press: 4, cleared: (...given: [string, number]) => void forgotten.push(given) };
   const session = {
     store,
     me: signal({ role: 'operator' }),
@@ -48,7 +50,7 @@ function drawn_with(state: RobotState) {
     vitals: { now: signal({ page_ms: null, robot_ms: null, seen_ms: null }) },
     stop_state: signal(kIdleStop),
     stop_selected: () => void pressed.push('stop'),
-    emergency: { forget: () => undefined },
+    emergency,
     api: { clear_emergency: (_: string, id: string) => Promise.resolve(void cleared.push(id)) },
   } as unknown as Session;
   const page = new FakeNode(1, 'body');
@@ -57,7 +59,7 @@ function drawn_with(state: RobotState) {
     store.receive({ type: 'robot', robot: next });
     store.refresh();
   };
-  return { page, receive, cleared, pressed, session };
+  return { page, receive, cleared, pressed, session, emergency, forgotten };
 }
 
 test('the latch is cleared by a hold of a whole second', async () => {
@@ -68,6 +70,19 @@ test('the latch is cleared by a hold of a whole second', async () => {
   expect(cleared).toEqual([]);
   await vi.advanceTimersByTimeAsync(1);
   expect(cleared).toEqual(['A']);
+});
+
+// SAFETY: a press while the clear is on its way is another one.
+test('a clear is for the robot and the press of when it was asked for', async () => {
+  const { page, session, emergency, forgotten } = drawn_with(latched('A'));
+  session.api.clear_emergency = () => {
+    emergency.newest_press = 5; // Escape, before the answer
+    return Promise.resolve({} as never);
+  };
+  await vi.advanceTimersByTimeAsync(100);
+  page.find('clear-emergency')!.fire('PointerDown');
+  await vi.advanceTimersByTimeAsync(kGuard_ms + 100);
+  expect(forgotten).toEqual([['a', 4]]);
 });
 
 // SAFETY: whoever holds has seen the emergency before, not the one that has come since.

@@ -27,10 +27,11 @@ export function Latch({ session, robot }: { session: Session; robot: Robot }) {
     return asking.outcome.value.phase === 'idle' ? null : <OutcomeLine asking={asking} />;
   }
   const name = known_id === null ? '' : session.store.latches.name(known_id, emergency_cause);
-  const clear = (id: string) =>
-    asking
-      .ask(`Clear “${name}”`, () => session.api.clear_emergency(robot_id, id))
-      .then((cleared) => cleared && session.emergency.forget());
+  const clear = async (id: string) => {
+    const press = session.emergency.newest_press;
+    const is_cleared = await asking.ask(`Clear “${name}”`, () => session.api.clear_emergency(robot_id, id));
+    if (is_cleared) session.emergency.cleared(robot_id, press);
+  };
   return (
     <div class="latch" id="latch" data-emergency-id={known_id ?? ''}>
       <h2>{mode === 'emergency' ? 'Latched: the motor stays off' : 'Stop not acknowledged yet'}</h2>
