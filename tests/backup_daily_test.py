@@ -1,0 +1,64 @@
+"""deploy/debian/backup-daily, with a program in place of rheonaut that writes the copy: which copies stay."""
+import os
+import pathlib
+import subprocess
+import tempfile
+import unittest
+
+SCRIPT = pathlib.Path(__file__).resolve().parent.parent / "deploy/debian/backup-daily"
+AHEAD = [f"daily-203001{day:02}-000000.sqlite" for day in (1, 2, 3)]
+
+
+class BackupDailyTest(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.data = pathlib.Path(folder.name)
+        self.copies = self.data / "daily"
+        self.copies.mkdir()
+
+    def names(self):
+        return sorted(path.name for path in self.copies.iterdir())
+
+    def back_up(self, program='for name; do :; done; echo new > "$name"', **settings):
+        """`program` finds the name of the copy as its last argument."""
+        rheonaut = self.data / "rheonaut"
+        rheonaut.write_text(f"#!/bin/sh\n{program}\n")
+        rheonaut.chmod(0o755)
+        return subprocess.run([SCRIPT], env={**os.environ, "RHEONAUT_DATA": str(self.data),
+                                             "RHEONAUT_PROGRAM": str(rheonaut), **settings}, capture_output=True, text=True)
+
+    def fill(self, *names):
+        for name in names:
+            (self.copies / name).write_text("older")
+
+    def test_the_new_copy_stays_though_older_ones_have_later_names(self):
+        self.fill(*AHEAD)
+        self.assertEqual(0, self.back_up().returncode)
+        new = set(self.names()) - set(AHEAD)
+        self.assertEqual(1, len(new), self.names())
+        self.assertEqual("new\n", (self.copies / new.pop()).read_text())
+        self.assertEqual(3, len(self.names()))
+        self.assertNotIn(AHEAD[0], self.names())
+
+    def test_one_copy_is_the_new_one(self):
+        self.fill(*AHEAD)
+        self.assertEqual(0, self.back_up(RHEONAUT_BACKUP_COPIES="1").returncode)
+        self.assertEqual(1, len(self.names()))
+        self.assertNotIn(self.names()[0], AHEAD)
+
+    def test_what_a_killed_run_left_is_removed_and_files_of_others_stay(self):
+        others = ["monday.sqlite", "monday.sqlite.part", "daily-report.sqlite"]
+        self.fill("daily-20260101-000000.sqlite.part", *others)
+        self.assertEqual(0, self.back_up().returncode)
+        self.assertEqual(set(others), {name for name in self.names() if not name.startswith("daily-2")})
+        self.assertEqual(len(others) + 1, len(self.names()))
+
+    def test_a_backup_that_fails_removes_no_older_copy(self):
+        self.fill("daily-20250101-000000.sqlite", *AHEAD)
+        self.assertNotEqual(0, self.back_up("exit 1").returncode)
+        self.assertEqual(4, len(self.names()))
+
+
+if __name__ == "__main__":
+    unittest.main()
