@@ -80,7 +80,7 @@ class ModalRegressors {
   double log_step_ = 0;
   double turn_rate_ = 0;  // a
   std::vector<Complex> log_rate_;
-  Eigen::Index slow_ = 0;  // so many of the rates are slow
+  Eigen::Index slow_ = 0;  // how many of the rates are slow
   std::vector<Column> columns_;
   Eigen::MatrixXd expansion_;
 };

@@ -39,7 +39,7 @@ struct KnownMinimum {
   double cost = 0;
 };
 
-// Whether the data can tell one minimum from a better one, of so many values.
+// Whether the data, of this number of values, do not tell the one cost from the best one.
 bool costs_agree(double cost, double best, double values);
 
 Descended descend(const SquaresToMinimise& squares, Eigen::VectorXd x, int iteration_limit, Progress progress,

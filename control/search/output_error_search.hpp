@@ -88,7 +88,7 @@ class OutputErrorSearch {
   // By the model's five parameters, as they are measured, if the duty had been this one; and the model's velocity.
   std::vector<Eigen::MatrixXd> model_slopes(const std::vector<double>& duty, const SearchPoint& point) const;
   std::vector<double> model_velocity_m_s(const SearchPoint& point);
-  // The output as it is measured, so many samples late: a column each.
+  // The output as it is measured, late by each of `samples`: a column each.
   std::vector<Eigen::MatrixXd> late_outputs(const std::vector<Eigen::Index>& samples, const SearchPoint& point);
 
  private:

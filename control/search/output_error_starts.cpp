@@ -12,7 +12,7 @@ using Eigen::Index;
 
 constexpr std::size_t kScanSamples = 4000;   // of the piece on which dead times are tried
 constexpr std::size_t kFewestSamples = 100;  // of the piece
-constexpr double kScanDeadTimes = 4;         // the piece is at least so many of the longest
+constexpr double kScanDeadTimes = 4;         // the length of the piece, at least, in longest dead times
 
 // 1/2, 1/4, 3/4, 1/8, 5/8, ... for 1, 2, ...: spread evenly however many are taken.
 double spread(int index) {

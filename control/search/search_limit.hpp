@@ -18,7 +18,7 @@ class SearchLimit {
 
   SearchLimit(double limit_s, std::function<bool(const Progress&)> on_progress, Clock clock);
 
-  void begin_share(int parts);  // what follows may use one of so many equal parts of the time that is left
+  void begin_share(int parts);  // what follows may use 1/parts of the time that is left
   void begin(const Progress& progress) { progress_ = progress; }
   void report(const Progress& progress);  // calls the progress function at once
   bool is_reached();

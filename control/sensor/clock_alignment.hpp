@@ -39,7 +39,7 @@ struct ClockAlignment {
   double offset_s = 0;
   double offset_sd_s = 0;
   double correlation = 0;   // ρ at its maximum
-  double motion_ratio = 0;  // g: the outside record moves so many times what the robot's own does
+  double motion_ratio = 0;  // g: motion of the outside record by that of the robot's own
 };
 
 ClockAlignment align_clocks(PositionRecord outside, PositionRecord own, OffsetRange range = {});

@@ -32,7 +32,7 @@ struct Record {
 // Where a recording comes from: a file, or QEMU's standard input.
 class RecordingSource {
  public:
-  // False when there are not so many bytes left.
+  // False when fewer bytes are left.
   virtual bool read(void* to, std::size_t size) = 0;
 
  protected:

@@ -45,7 +45,7 @@ class AnalysisService {
   // What is said of the position that was measured from outside, if the run has one.
   boost::asio::awaitable<Result<std::optional<storage::OutsideReference>>> reference(storage::RunId run);
 
-  // In order of span and seq; invalid when there are more than so many.
+  // In order of span and seq; invalid when there are more than `limit`.
   boost::asio::awaitable<Result<RunSamples>> samples(storage::RunId run, std::size_t limit);
 
   // Puts an outside record onto the clock of the run; errors of place_reference, and as above.

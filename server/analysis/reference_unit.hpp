@@ -12,7 +12,7 @@
 
 namespace server::analysis {
 
-// What to do about positions that move so many times what the robot's own record does.
+// What to do about positions whose motion is `ratio` times that of the robot's own record.
 std::string unit_advice(double ratio);
 
 // Both motions at the same, ascending times.

@@ -18,7 +18,7 @@ namespace server::identity {
 
 inline constexpr microseconds kTicketValidity{std::chrono::minutes{2}};
 inline constexpr std::size_t kMaxTicketsOfOne = 4;  // of an actor; one more takes the place of the oldest
-inline constexpr std::size_t kMaxTickets = 256;     // likewise, of all
+inline constexpr std::size_t kMaxTickets = 256;     // of all; the same holds
 
 class Tickets {
  public:

@@ -94,7 +94,7 @@ class LiveFeed final : public station::StationSink {
   std::unordered_map<station::RobotId, Robot> robots_;
   std::vector<station::RobotId> changed_;         // that have a change
   std::vector<station::RobotEvent> events_;       // of the next log
-  std::vector<station::CommandRecord> commands_;  // likewise; of each command the newest record
+  std::vector<station::CommandRecord> commands_;  // of the next log; of each command the newest record
 };
 
 }  // namespace server::live

@@ -19,7 +19,7 @@ namespace server::live {
 class RobotTexts {
  public:
   static constexpr std::size_t kPieceBytes = 32 * 1024;  // a piece ends with the robot that reaches it,
-  static constexpr std::size_t kWrittenInAPiece = 8;     // or with so many texts that had to be written, 30 µs each
+  static constexpr std::size_t kWrittenInAPiece = 8;     // or when this number of texts had to be written, 30 µs each
 
   struct Piece {
     std::string text;       // JSON objects with commas between them

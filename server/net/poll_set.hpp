@@ -2,8 +2,8 @@
 // 500 times a second, for a few microseconds each.
 //
 //   sockets ─┬─ epoll of all ────────── polled every 2 ms ──────────── a few sockets, then the loop's other work
-//            ├─ epoll of the awaited ── polled when one is ready ────── likewise
-//            └─ list of the quiet ───── each read every 30 ms ───────── likewise
+//            ├─ epoll of the awaited ── polled when one is ready ────── a few, then the other work
+//            └─ list of the quiet ───── each read every 30 ms ───────── a few, then the other work
 //
 // The second is for sockets from which an answer is expected, and those with a waiting writer. When hardly any robot
 // sends, the first is polled when a socket is ready, too. The third is for sockets for whose bytes nobody waits: one

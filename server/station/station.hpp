@@ -103,7 +103,7 @@ class Station {
   // Of heartbeats of all robots: there and back, without the time that the robot took to answer.
   const runtime::TimeHistogram& round_trips() const;
   std::uint64_t invalid_values() const;   // of all robots, since the station started
-  std::uint64_t events_left_out() const;  // likewise
+  std::uint64_t events_left_out() const;  // of all robots, since the station started
 
   // --- called by robot sessions (link/) ---
 
@@ -167,7 +167,7 @@ class Station {
                   std::uint64_t durable_next_event_seq);
   void request_resend(const RobotId& id, BootId boot_id, std::uint64_t first_seq, std::uint64_t next_seq);
   void request_event_resend(const RobotId& id, BootId boot_id);
-  // The boot came back with so many samples in this range that were given up.
+  // The boot came back with this number of samples in this range that were given up.
   void note_returned(const RobotId& id, BootId boot_id, std::uint64_t first_seq, std::uint64_t last_seq,
                      std::uint64_t samples);
 

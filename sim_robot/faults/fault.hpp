@@ -95,7 +95,7 @@ struct Fault {
 
   Direction direction = Direction::both;
   bool then_reset = false;        // an outage ends with the end of the connections
-  std::uint64_t after_bytes = 0;  // a cut: so many of those under way still arrive
+  std::uint64_t after_bytes = 0;  // a cut: how many of those under way still arrive
   double delay_s = kMustBeGiven, jitter_s = 0;
   double bytes_per_s = kMustBeGiven;
   double loss_probability = kMustBeGiven, retransmit_s = 0.2;

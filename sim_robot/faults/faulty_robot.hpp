@@ -25,7 +25,7 @@ class FaultyLink {
   virtual void half_open(Direction direction) = 0;
   // Ends outage and half-open; waiting bytes come at once.
   virtual void resume() = 0;
-  virtual void cut(std::size_t after_bytes) = 0;  // the end behind so many of the bytes under way
+  virtual void cut(std::size_t after_bytes) = 0;  // the end behind this number of the bytes under way
   virtual void reset() = 0;                       // the end at once, and nothing of them
   // For bytes from now on.
   virtual void impair(const Impairment& up, const Impairment& down) = 0;

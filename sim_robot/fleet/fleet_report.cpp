@@ -17,7 +17,7 @@ double seconds(const timeval& time) {
   return static_cast<double>(time.tv_sec) + static_cast<double>(time.tv_usec) / 1e6;
 }
 
-constexpr std::uint64_t kMissedShare = 20;  // one tick in so many may be skipped
+constexpr std::uint64_t kMissedShare = 20;  // one tick in 20 may be skipped
 
 double per_second(std::uint64_t from, std::uint64_t to, double dt_s) {
   return dt_s > 0 ? static_cast<double>(to - from) / dt_s : 0;

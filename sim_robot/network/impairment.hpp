@@ -32,7 +32,7 @@ struct Impairment {
   double bytes_per_s = 0;           // 0: no throttle
   double loss_probability = 0;      // of a segment, each time it is sent; in [0, 1)
   double retransmit_s = 0.2;        // rto
-  std::size_t split_bytes = 0;      // at most so many come out at once; 1: every byte by itself; 0: no limit
+  std::size_t split_bytes = 0;      // the most that come out at once; 1: every byte by itself; 0: no limit
   std::size_t buffer_bytes = 4096;  // taken and not yet out; the robot's TCP stack holds about as much
 };
 
@@ -49,7 +49,7 @@ class ImpairedStream {
   std::size_t push(protocol::Bytes bytes, std::uint64_t now_us);
   // Ends the stream: the end follows the last byte as a segment of its own. Nothing is taken after it.
   void close(std::uint64_t now_us);
-  // Ends the stream after so many of the bytes under way, and drops the rest.
+  // Ends the stream after this number of the bytes under way, and drops the rest.
   void cut(std::size_t after_bytes, std::uint64_t now_us);
   // Returns the bytes that are due by now: at most split_bytes, and 0 when there are none.
   std::size_t pull(std::uint8_t* out, std::size_t capacity, std::uint64_t now_us);

@@ -29,7 +29,7 @@ class ProxyConnection : public std::enable_shared_from_this<ProxyConnection> {
   void half_open(Direction direction);
   void resume();
   void impair(const Impairment& up, const Impairment& down);
-  void cut(std::size_t after_bytes);  // the end (FIN) to both sides behind so many bytes
+  void cut(std::size_t after_bytes);  // the end (FIN) to both sides behind this number of bytes
   void reset();                       // RST to both sides
   void close();                       // both sockets, as they are
   bool ended() const { return ended_; }

@@ -1,7 +1,7 @@
 // The real programs that the browser test drives: station, simulated robot and Chromium, each ended by its own id.
 import { spawn } from 'node:child_process';
 import { once } from 'node:events';
-import { existsSync, mkdirSync, mkdtempSync, readFileSync, rmSync } from 'node:fs';
+import { mkdirSync, mkdtempSync, readFileSync, rmSync } from 'node:fs';
 import { createRequire } from 'node:module';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
@@ -29,6 +29,16 @@ export async function until(what, probe, bound_ms = kLongestWait_ms) {
     if (found) return found;
     if (performance.now() > end_ms) throw new Error(`not within ${bound_ms} ms: ${what}`);
     await new Promise((resolve) => setTimeout(resolve, 20));
+  }
+}
+
+// What a file says; null when it is not there yet, or not written to its end.
+export function read_json(file) {
+  try {
+    return JSON.parse(readFileSync(file, 'utf8'));
+  } catch (error) {
+    if (error.code === 'ENOENT' || error instanceof SyntaxError) return null;
+    throw error;
   }
 }
 
@@ -114,8 +124,8 @@ export class Bench {
     const pid = this.station.process.pid;
     this.endpoints = await until('the station announces its endpoints', () => {
       if (!this.station.runs) throw new Error('the station ended');
-      const said = existsSync(file) && JSON.parse(readFileSync(file, 'utf8'));
-      return said && said.pid === pid ? said : null;
+      const said = read_json(file);
+      return said?.pid === pid ? said : null;
     });
   }
 

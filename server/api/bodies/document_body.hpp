@@ -9,7 +9,7 @@
 
 namespace server::api {
 
-// `runs`: so many numbers with commas between them, e.g. runs=1,2.
+// `runs`: numbers with commas between them, e.g. runs=1,2.
 Result<std::vector<storage::RunId>> query_runs(const http::Request& request, std::size_t least, std::size_t most);
 
 // `bin_mm`, in metres.

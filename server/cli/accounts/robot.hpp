@@ -23,7 +23,7 @@ struct RobotCommand {
   std::string robot_id;
   bool json = false;
   RobotSettingsCommand settings;         // runs instead, unless its `of` is nothing
-  RobotReservationCommand reservations;  // likewise, unless its `act` is nothing
+  RobotReservationCommand reservations;  // runs instead, unless its `act` is nothing
 };
 
 void add_options(CLI::App& command, RobotCommand& options);

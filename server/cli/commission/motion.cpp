@@ -18,7 +18,7 @@ constexpr double kTickS = 0.01;
 constexpr double kSeenSd = 4;  // of the noise
 // m/s per duty of the paper's slower fluid, (29), and the share of it that is reached within the window.
 constexpr double kSlowestMS = 0.1, kSlowestShare = 0.8;
-constexpr double kWellBelow = 4;  // so many times below it the noise has to lie before no motion is believed
+constexpr double kWellBelow = 4;  // the noise has to lie this factor below it before no motion is believed
 constexpr auto kWindow = static_cast<std::size_t>(kResponseWindowS / kTickS);
 
 constexpr const char* kSettings = "robot_fw/esp8266/settings.hpp";

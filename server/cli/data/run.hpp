@@ -21,8 +21,8 @@ struct RunCommand {
 
 void add_options(CLI::App& command, RunCommand& options);
 
-// Without `samples` it gives up nothing, and throws std::runtime_error saying how many are missing; likewise when the
-// station refuses.
+// Without `samples` it gives up nothing, and throws std::runtime_error saying how many are missing. It also throws when
+// the station refuses.
 int run(const RunCommand& options, std::ostream& out);
 
 }  // namespace server::cli

@@ -150,7 +150,7 @@ std::string schema_of(SQLite::Database& database) {
   return text;
 }
 
-// Counting millions of rows would hold the write-ahead log of a station that records: beyond so many, the largest
+// Counting millions of rows would hold the write-ahead log of a station that records: beyond a limit, the largest
 // rowid.
 std::int64_t about_how_many(SQLite::Database& database, const std::string& table) {
   constexpr std::int64_t kMostCounted = 100'000;
@@ -161,7 +161,7 @@ std::int64_t about_how_many(SQLite::Database& database, const std::string& table
   try {
     return database.execAndGet(fmt::format("SELECT max(rowid) FROM \"{}\"", table)).getInt64();
   } catch (const SQLite::Exception&) {
-    return counted;  // a table without rowid: at least so many
+    return counted;  // a table without rowid: it has at least these
   }
 }
 

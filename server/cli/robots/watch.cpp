@@ -72,7 +72,7 @@ std::string control_text(const json& robot) {
   return control.is_object() ? one_line(control.value("holder", std::string{"-"})) : "-";
 }
 
-// The first so many characters.
+// The first characters of the text, one a column.
 std::string cut(const std::string& text, std::size_t columns) {
   std::size_t seen = 0, i = 0;
   for (; i < text.size(); ++i) {

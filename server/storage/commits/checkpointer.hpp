@@ -93,7 +93,7 @@ class Checkpointer {
   runtime::Signal committed_;
 
   WalState state_;
-  std::uint64_t commits_ = 0;         // so many have gone into the log
+  std::uint64_t commits_ = 0;         // that have gone into the log
   std::uint64_t passed_commits_ = 0;  // are in the database, too, and maybe more
   std::int64_t next_pass_us_ = 0;     // steady; of a log that is short
   bool is_passing_ = false;

@@ -24,7 +24,7 @@ class BackupCopy {
   // Replaces the file `to`.
   BackupCopy(SQLite::Database& from, const std::filesystem::path& to);
 
-  // Copies at most so many pages more. True: the copy is complete.
+  // Copies at most this number of pages. True: the copy is complete.
   bool step(int pages);
 
   // Lets go of the handle it copies from, after the last step. What is left to do concerns the copy's file alone, and

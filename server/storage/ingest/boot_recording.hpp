@@ -138,7 +138,7 @@ class BootRecording {
   IntervalSet refused_events_;
 
   std::vector<Segment> waiting_;
-  std::size_t complete_ = 0;  // so many of them, up to the last complete one
+  std::size_t complete_ = 0;  // how many of them, up to the last complete one
   std::int64_t waiting_since_us_ = 0;
   std::int64_t completed_at_us_ = 0;
   bool has_new_events_ = false;

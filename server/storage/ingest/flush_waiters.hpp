@@ -31,7 +31,7 @@ class FlushWaiters {
 
   // A commit was built: it has the records that anybody waits for.
   void on_commit_built();
-  // The last commit is durable, and so many segments are.
+  // The last commit is durable, and all up to this position.
   void on_durable(std::uint64_t position);
 
  private:

@@ -11,7 +11,7 @@
 //
 // Overflow: when the queue is full a batch is neither queued nor acknowledged; the robot still holds it, and it is
 // asked for again (set_on_missing's function) once the queue has drained. Missing samples are asked for the same way.
-// Events are asked for likewise. Commands beyond the limit, and what the station itself reports, are counted and not
+// So are events. Commands beyond the limit, and what the station itself reports, are counted and not
 // recorded, but an emergency stop always is.
 //
 // A disk that fails (full, locked by another program) never ends the station: what could not be written is kept, not
@@ -100,7 +100,7 @@ struct GiveUpOrder {
   };
   station::RobotId robot_id;
   std::vector<Part> parts;
-  std::optional<std::uint64_t> samples;  // so many are missing, if they are to be given up
+  std::optional<std::uint64_t> samples;  // how many must be missing for them to be given up
   station::AuditNote note;               // its detail gets how many they are, and the range of each boot
 };
 

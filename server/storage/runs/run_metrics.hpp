@@ -30,7 +30,7 @@ class MetricsOfRuns {
  public:
   MetricsOfRuns(Recorder& recorder, DatabaseReader& reader) : recorder_{recorder}, reader_{reader} {}
 
-  // Of this version, by this reference, and of at least so many samples.
+  // Of this version, by this reference, and of at least this number of samples.
   boost::asio::awaitable<std::optional<StoredMetrics>> find(RunId run, int version, std::int64_t samples,
                                                             std::int64_t reference_us);
   // unavailable when the disk cannot be written.

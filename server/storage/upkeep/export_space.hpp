@@ -10,7 +10,7 @@
 
 namespace server::storage {
 
-// Twice what so many samples need in any format, and what the recording goes on with. unavailable (low_space).
+// Twice what these samples need in any format, and what the recording goes on with. unavailable (low_space).
 Result<void> room_for_export(const std::filesystem::path& folder, std::uint64_t samples);
 
 // Nobody knows before how long the gaps of a grid are. unavailable (low_space).

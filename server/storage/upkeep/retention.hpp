@@ -22,7 +22,7 @@ namespace server::storage {
 
 struct RetentionPolicy {
   std::uint32_t retention_days = 0;        // of samples; 0: for ever
-  std::uint32_t event_retention_days = 0;  // likewise
+  std::uint32_t event_retention_days = 0;  // of events; 0: for ever
   std::uint64_t max_database_bytes = 0;    // 0: no limit
 };
 

@@ -1,6 +1,6 @@
 // The controller as the robot holds it: what a discretisation becomes on its way there, in float32.
 //
-//   r/(1 - p z⁻¹) = r + r p/(z - p);   biquads likewise                                      (1)
+//   r/(1 - p z⁻¹) = r + r p/(z - p);   biquads the same way                                  (1)
 //
 // The station does (1) when it sends; control_law_test.ts compares it with what the robot reports.
 

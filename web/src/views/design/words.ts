@@ -8,7 +8,7 @@ import { is_at_work, type Answer } from './jobs';
 
 export const kMinus = '\u2212';
 
-// A number with so many digits that count: "0.0998", "30.1", "−1.2e-15".
+// A number with this number of significant digits: "0.0998", "30.1", "−1.2e-15".
 export function number_text(value: number | null | undefined, digits = 4): string {
   if (value === null || value === undefined || !Number.isFinite(value)) return '–';
   if (value !== 0 && (Math.abs(value) < 1e-4 || Math.abs(value) >= 1e6))

@@ -57,7 +57,7 @@ export function time_of(run: Run): { from_us: number; to_us?: number } {
 export class RunsApi {
   constructor(private readonly api: Pick<Api, 'read' | 'change'>) {}
 
-  // Gives up what is missing of it, if that is still so many samples.
+  // Gives up what is missing of it, if that is still this number of samples.
   finalize = (run_id: number, samples_missing: number) =>
     this.api.change<FinalizedRun>(`/runs/${run_id}/finalize`, { samples_missing });
 
