@@ -24,6 +24,9 @@ constexpr std::int64_t kGridUs = 4'000;  // at whose multiples sessions wake, ma
 // it could not send before, and its memory for what we have not acknowledged may be small.
 constexpr std::int64_t kCommandedUs = 5'000'000, kMuchUs = 1'000'000;
 constexpr std::size_t kMuchBytes = 2048;
+// And after nothing had come in a quiet pause: it sends more rarely than that, so that pauses save nothing and cost a
+// read each.
+constexpr std::int64_t kSparseUs = 10'000'000;
 
 }  // namespace
 
@@ -99,6 +102,8 @@ void RobotSession::read() {
       last_received_us_ = clock_.steady_us();
       if (got.size > kMuchBytes) stay_prompt(kMuchUs);
       on_bytes({buffers_.input.data(), got.size});
+    } else {
+      stay_prompt(kSparseUs);
     }
     if (got.has_ended && close_reason_.empty()) close_reason_ = kClosedByRobot;
     if (!robot_id_.empty()) update_read_pace();

@@ -72,6 +72,7 @@ class MemoryLink {
 
   void cut();                    // both ends see the end of the stream
   ReadPace second_pace() const;  // as its owner said last; here everything is read at once
+  void call_second();            // as a set of sockets calls the owner of a quiet one, also when nothing has come
   void stall(bool stalled);      // half-open: bytes are accepted and not delivered until the stall ends
 
  private:

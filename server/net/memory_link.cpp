@@ -120,6 +120,8 @@ void MemoryLink::cut() {
 
 ReadPace MemoryLink::second_pace() const { return there_->pace; }
 
+void MemoryLink::call_second() { std::function{there_->on_readable}(); }
+
 void MemoryLink::stall(bool stalled) {
   for (Pipe* pipe : {there_.get(), back_.get()}) {
     pipe->stalled = stalled;

@@ -12,7 +12,7 @@ import unittest
 ROOT = pathlib.Path(__file__).parents[3]
 BIN = pathlib.Path(os.environ["RHEONAUT_BIN"])
 # What prints no result for people: a program that runs on, scripts and pages, documents that are JSON or CSV already.
-WITHOUT_JSON = {"serve", "demo", "completion", "man", "design show", "design export", "reference export"}
+WITHOUT_JSON = {"serve", "completion", "man", "design show", "design export", "reference export"}
 ROFF_REQUESTS = {"TH", "SH", "SS", "TP", "PP", "EX", "EE"}
 
 

@@ -122,5 +122,16 @@ TEST_F(ReadPaceTest, OneThatSendsMuchAtOnceIsPromptForASecond) {
   EXPECT_EQ(pace(), ReadPace::quiet);
 }
 
+// One with ten samples a frame sends ten frames a second: to read it every 30 ms would take three times as many reads.
+TEST_F(ReadPaceTest, OneThatSendsMoreRarelyThanEachPauseIsPromptForTenSeconds) {
+  ASSERT_EQ(pace(), ReadPace::quiet);
+  robot->link.call_second();
+  EXPECT_EQ(robot->link.second_pace(), ReadPace::prompt);
+  clock.run_for(9'900ms);
+  EXPECT_EQ(pace(), ReadPace::prompt);
+  clock.run_for(200ms);
+  EXPECT_EQ(pace(), ReadPace::quiet);
+}
+
 }  // namespace
 }  // namespace server
