@@ -51,7 +51,7 @@ static int serve(const config::Config& config) {
   analysis::AnalysisService analysis{recording.history, maths};
   const auto options = api::api_options(config, restored.store_id, config::text(robots.endpoint()), security);
   api::ApiServer api{loop, tasks, clock, options, station, live, recording, analysis, experiments};
-  if (config.real_time) tasks.spawn("priorities", ask_for_real_time(disk));
+  if (config.real_time) tasks.spawn("priorities", keep_priorities(disk, clock));
   recording.spawn(tasks);
   tasks.spawn("control", station.watch_control());
   tasks.spawn("live feed", live.run());

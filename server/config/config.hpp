@@ -74,7 +74,7 @@ struct Config {
 
   bool foxglove = false;  // foxglove.enabled: live samples by the Foxglove WebSocket protocol
 
-  bool real_time = true;  // station.real_time: the loop asks for real-time priority
+  bool real_time = true;  // station.real_time: the loop has real-time priority on a busy machine
 
   std::string log_level = "info";   // log.level: trace, debug, info, warn, error
   std::string log_format = "text";  // log.format: text, or json with one object a line

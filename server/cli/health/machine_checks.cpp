@@ -154,8 +154,9 @@ void check_real_time(const RunningStation& running, const config::Config& config
       "permit it: LimitRTPRIO=2 in the systemd unit, or a line '@USER - rtprio 2' in "
       "/etc/security/limits.conf; without it a busy machine may delay a stop";
   if (running.is_running && running.pid > 0) {
-    const int policy = sched_getscheduler(running.pid) & ~SCHED_RESET_ON_FORK;
-    if (policy == SCHED_RR) return findings.fine("real time", "the station's loop has real-time priority");
+    // The mark that the station leaves where it was permitted, also while the loop is ordinary.
+    const bool is_permitted = (sched_getscheduler(running.pid) & SCHED_RESET_ON_FORK) != 0;
+    if (is_permitted) return findings.fine("real time", "the station's loop has real-time priority on a busy machine");
     return findings.note("real time", "the station's loop runs without real-time priority", kPermit);
   }
   rlimit limit{};
