@@ -15,6 +15,7 @@ namespace server {
 namespace {
 
 namespace asio = boost::asio;
+using namespace std::chrono_literals;
 
 struct Scheduling {
   int policy = -1, priority = -1;
@@ -82,7 +83,7 @@ TEST(RealTime, OnABusyMachineTheLoopIsBeforeTheDiskAndBothBeforeOrdinaryThreads)
       const std::int64_t busy_until_us = clock.steady_us() + 1000;  // so that it wants a processor
       while (clock.steady_us() < busy_until_us) {
       }
-      co_await clock.sleep_for(std::chrono::milliseconds{1});
+      co_await clock.sleep_for(1ms);
     }
   });
   EXPECT_GT(loop_thread.priority, disk_thread.priority);
