@@ -210,7 +210,7 @@ void RobotSession::on_frame(protocol::RobotFrame& frame) {
     return;
   }
   const station::FrameFaults faults = station::mend(frame, reach_);
-  if (!faults.is_unusable) reach_.advance(frame);
+  if (faults.has_number) reach_.advance(frame);
   station_.on_frame(*this, frame.robot_time_us);
   if (faults.count > 0) station_.on_invalid_values(*this, faults.count, faults.cause, faults.first);
   if (faults.is_unusable) return faults.has_number ? report_unusable(frame) : void();

@@ -51,6 +51,24 @@ asio::awaitable<Result<CommandRecord>> outcome_of(StationParts& parts, std::shar
   co_return pending->record;
 }
 
+// When it goes, what waits to be recorded is recorded, and how much was left out.
+class RecordsAtTheEnd {
+ public:
+  explicit RecordsAtTheEnd(StationParts& parts) : parts_{parts} {}
+  ~RecordsAtTheEnd() {
+    try {
+      parts_.record_waiting(true);
+    } catch (const std::exception& error) {
+      spdlog::error("what was left out of the record was not counted in it: {}", error.what());
+    }
+  }
+  RecordsAtTheEnd(const RecordsAtTheEnd&) = delete;
+  RecordsAtTheEnd& operator=(const RecordsAtTheEnd&) = delete;
+
+ private:
+  StationParts& parts_;
+};
+
 std::string slot_text(const Reservation& slot) {
   const std::string purpose = slot.purpose.empty() ? "" : ": " + slot.purpose;
   return fmt::format("{} for {} from {} until {}{}", slot.id, slot.holder, utc_text(slot.from_us),
@@ -151,10 +169,12 @@ std::optional<std::int64_t> Station::seen_us(const std::string& actor) const { r
 std::string Station::holder(const RobotId& id) const { return parts_->control.of(id).holder; }
 
 asio::awaitable<void> Station::watch_control() {
+  const RecordsAtTheEnd records_at_the_end{*parts_};
   for (;;) {
     co_await parts_->clock.sleep_for(kWatchInterval);
     parts_->end_control();
     parts_->show_reservations();
+    parts_->record_waiting(false);
   }
 }
 

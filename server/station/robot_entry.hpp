@@ -6,6 +6,7 @@
 
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include "server/station/commands/order_timeline.hpp"
 #include "server/station/commands/robot_commands.hpp"
@@ -28,6 +29,12 @@ struct TimedOrders {
   bool is_of_earlier_run = false;  // nobody knows whether one waits: the station has restarted since this boot began
 };
 
+// An event that was too many. It is recorded as soon as one may be, unless a later one of its kind comes before that.
+struct HeldEvent {
+  protocol::EventKind kind = rheonaut_EVENT_KIND_UNSPECIFIED;
+  RobotEvent event;
+};
+
 struct RobotEntry {
   explicit RobotEntry(RobotState& of) : robot{of} {}
 
@@ -46,6 +53,11 @@ struct RobotEntry {
   EventLimit refusals{kEventPeriodUs};
   EventLimit invalid_values{kEventPeriodUs};
   EventAllowance events;
+  std::vector<HeldEvent> held_events;  // one of each kind; oldest first
+  LeftOutCount events_left_out;
+  ConnectionAllowance connections;
+  bool is_connection_recorded = false;  // of the connection that is
+  LeftOutCount connections_left_out;
   std::uint64_t next_event_seq = 0;  // of this boot: those from here on have not come before
 };
 

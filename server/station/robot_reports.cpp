@@ -32,7 +32,7 @@ void record(StationParts& parts, RobotEntry& entry, Checked<protocol::Event> che
   if (entry.events.take(event.kind, parts.clock.steady_us())) {
     parts.notifier.publish(entry.robot, event_of(entry.robot, checked));
   } else if (is_new) {
-    parts.leave_out(entry, event.event_seq);
+    parts.hold(entry, event.kind, event_of(entry.robot, checked));
   }
 }
 
@@ -54,17 +54,19 @@ void Station::on_connected(RobotLink& link, const AdmissionRequest& hello, const
   if (RobotLink* previous = RobotTable::connect(entry, link); previous != nullptr) {
     previous->close(fmt::format("replaced by a connection from {}", peer));
     parts_->tracker.end_with_link(entry, "link_lost");  // SAFETY: what it was sent last may not have arrived
-    parts_->notifier.note(robot, "connection_replaced", fmt::format("{} takes the place of {}", peer, robot.peer));
+    if (parts_->end_of_recorded(entry)) {
+      parts_->notifier.note(robot, "connection_replaced", fmt::format("{} takes the place of {}", peer, robot.peer));
+    }
   }
-  const bool lost_its_latch = robot.latched() && robot.boot_id != hello.boot_id && details.emergency_id == 0;
+  const bool is_other_boot = robot.boot_id != hello.boot_id;
+  const bool lost_its_latch = robot.latched() && is_other_boot && details.emergency_id == 0;
   begin_connection(entry, hello, details, admission, peer, parts_->clock.steady_us());
-  spdlog::info("robot '{}' connected from {}: boot {}, {} samples held, durable to {}", robot.id, peer, robot.boot_id,
-               details.next_seq - details.oldest_seq, admission.durable_next_seq);
   parts_->publish_stops_of(
       [&](std::vector<CommandRecord>& made) { parts_->stops.on_connected(entry, lost_its_latch, made); });
   entry.timed.drop_because = "link_lost";  // as the robot drops it when it notices
   parts_->drop_outdated(entry);
-  parts_->notifier.note(robot, "connected", fmt::format("from {}", peer));
+  if (is_other_boot) parts_->record_held(entry, true);  // before that boot counts as ended
+  parts_->record_connection(entry, false);
   parts_->notifier.publish(robot);
 }
 
@@ -72,13 +74,14 @@ void Station::on_disconnected(RobotLink& link, const std::string& reason) {
   RobotEntry* entry = RobotTable::of(link);
   if (entry == nullptr) return;  // another connection has taken its place
   RobotTable::disconnect(*entry);
-  parts_->report_left_out(*entry, true);
   RobotState& robot = entry->robot;
   robot.link = LinkState::disconnected;
   robot.stop_path = {.is_measured = robot.stop_path.is_measured};
-  spdlog::info("robot '{}' disconnected: {}", robot.id, reason);
   parts_->tracker.end_with_link(*entry, "link_lost");
-  parts_->notifier.note(robot, "disconnected", reason);
+  if (parts_->end_of_recorded(*entry)) {
+    spdlog::info("robot '{}' disconnected: {}", robot.id, reason);
+    parts_->notifier.note(robot, "disconnected", reason);
+  }
   parts_->notifier.publish(robot);
 }
 
@@ -110,7 +113,7 @@ void Station::on_frame(RobotLink& link, std::uint64_t robot_time_us) {
   robot.last_received_at_us = parts_->clock.utc_us();
   robot.last_received_steady_us = parts_->clock.steady_us();
   robot.latest_robot_time_us = std::max(robot.latest_robot_time_us, robot_time_us);
-  parts_->report_left_out(*entry, false);
+  parts_->record_held(*entry, false);
   parts_->tracker.expire(*entry);
   if (!robot.pending_stop) return;
   parts_->publish_stops_of([&](std::vector<CommandRecord>& made) { parts_->stops.repeat(*entry, made); });

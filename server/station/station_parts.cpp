@@ -1,8 +1,10 @@
 #include "server/station/station_parts.hpp"
 
 #include <fmt/format.h>
-#include <exception>
+#include <spdlog/spdlog.h>
 
+#include <algorithm>
+#include <exception>
 #include <string_view>
 
 #include "server/station/state/audit_details.hpp"
@@ -77,23 +79,82 @@ void StationParts::publish_refusal(Author by, const RobotId& robot_id, const cha
   notifier.publish(note);
 }
 
+void StationParts::hold(RobotEntry& entry, protocol::EventKind kind, RobotEvent event) {
+  const auto earlier = std::ranges::find_if(entry.held_events,
+                                            [&event](const HeldEvent& held) { return held.event.kind == event.kind; });
+  if (earlier != entry.held_events.end()) {
+    const std::uint64_t event_seq = *earlier->event.event_seq;
+    entry.held_events.erase(earlier);
+    leave_out(entry, event_seq);
+  }
+  entry.held_events.push_back({kind, std::move(event)});
+}
+
+void StationParts::record_held(RobotEntry& entry, bool all) {
+  std::vector<HeldEvent>& held = entry.held_events;
+  for (std::size_t index = 0; index < held.size();) {
+    if (!all && !entry.events.take(held[index].kind, clock.steady_us())) {
+      ++index;
+      continue;
+    }
+    const RobotEvent event = std::move(held[index].event);
+    held.erase(held.begin() + static_cast<std::ptrdiff_t>(index));
+    notifier.publish(entry.robot, event);
+  }
+}
+
+void StationParts::record_connection(RobotEntry& entry, bool at_once) {
+  const bool is_waiting = entry.link != nullptr && !entry.is_connection_recorded;
+  if (!is_waiting || (!at_once && !entry.connections.take(clock.steady_us()))) return;
+  entry.is_connection_recorded = true;
+  const RobotState& robot = entry.robot;
+  spdlog::info("robot '{}' connected from {}: boot {}, {} samples held, durable to {}", robot.id, robot.peer,
+               robot.boot_id, robot.next_seq - robot.oldest_seq, robot.durable_next_seq);
+  notifier.note(robot, "connected", fmt::format("from {}", robot.peer));
+}
+
+bool StationParts::end_of_recorded(RobotEntry& entry) {
+  if (std::exchange(entry.is_connection_recorded, false)) return true;
+  entry.connections_left_out.add(clock.steady_us());
+  return false;
+}
+
+void StationParts::record_waiting(bool is_end) {
+  for (auto& [id, entry] : robots.entries()) {
+    record_held(entry, is_end);
+    record_connection(entry, is_end);
+    report_left_out(entry, is_end);
+  }
+}
+
 void StationParts::leave_out(RobotEntry& entry, std::uint64_t event_seq) {
   ++events_left_out;
   ++entry.robot.events_left_out;
-  entry.events.count_left_out(clock.steady_us());
+  entry.events_left_out.add(clock.steady_us());
   notifier.publish_event_left_out(entry.robot, event_seq);
 }
 
 void StationParts::report_left_out(RobotEntry& entry, bool at_once) {
-  const auto left_out = entry.events.report(clock.steady_us(), at_once);
-  if (!left_out) return;
+  const std::int64_t now_us = clock.steady_us();
+  if (const auto events = entry.events_left_out.report(now_us, at_once)) {
+    std::string detail = fmt::format("{}: more than {} at once and {} a second are counted and not recorded",
+                                     left_out_text(*events), EventAllowance::kBurst, EventAllowance::kASecond);
+    spdlog::warn("robot '{}' sends too many events: {}", entry.robot.id, detail);
+    notifier.note(entry.robot, "events_left_out", std::move(detail), "too_many");
+  }
+  if (const auto connections = entry.connections_left_out.report(now_us, at_once)) {
+    std::string detail =
+        fmt::format("{}: more than {} at once and {} a minute are counted and not recorded",
+                    left_out_text(*connections), ConnectionAllowance::kBurst, ConnectionAllowance::kAMinute);
+    spdlog::warn("robot '{}' connects too often: {}", entry.robot.id, detail);
+    notifier.note(entry.robot, "connections_left_out", std::move(detail), "too_many");
+  }
+}
+
+std::string StationParts::left_out_text(const LeftOutCount::Report& left_out) const {
   const std::int64_t utc_minus_steady_us = clock.utc_us() - clock.steady_us();
-  std::string detail =
-      fmt::format("{} from {} to {}: more than {} at once and {} a second are counted and not recorded",
-                  left_out->count, utc_text(left_out->first_us + utc_minus_steady_us),
-                  utc_text(left_out->last_us + utc_minus_steady_us), EventAllowance::kBurst, EventAllowance::kASecond);
-  spdlog::warn("robot '{}' sends too many events: {}", entry.robot.id, detail);
-  notifier.note(entry.robot, "events_left_out", std::move(detail), "too_many");
+  return fmt::format("{} from {} to {}", left_out.count, utc_text(left_out.first_us + utc_minus_steady_us),
+                     utc_text(left_out.last_us + utc_minus_steady_us));
 }
 
 // Nothing is sent, and the audit gets an entry.

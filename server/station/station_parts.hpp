@@ -43,10 +43,17 @@ struct StationParts {
   // What was refused, for the audit; `detail` as a JSON object.
   void publish_refusal(Author by, const RobotId& robot_id, const char* what, const std::string& detail,
                        const Error& error);
-  // Counts an event that is not recorded, and reports it to the sinks.
-  void leave_out(RobotEntry& entry, std::uint64_t event_seq);
-  // An event says how many the robot's events were that were not recorded, at most once in 10 s or at once.
-  void report_left_out(RobotEntry& entry, bool at_once);
+  // Keeps an event of the robot that is too many now, in place of an earlier one of its kind.
+  void hold(RobotEntry& entry, protocol::EventKind kind, RobotEvent event);
+  // Has those recorded for which there is room now, or all.
+  void record_held(RobotEntry& entry, bool all);
+  // Has the robot's connection recorded, unless it has had too many and it need not be at once: then it waits.
+  void record_connection(RobotEntry& entry, bool at_once);
+  // The robot's connection is over. False: it was not recorded and is counted, so its end is not to be recorded either.
+  bool end_of_recorded(RobotEntry& entry);
+  // Of all robots: what waits is recorded when it may be, and how much was left out, at most once in 10 s; at the end
+  // all of it.
+  void record_waiting(bool is_end);
   std::unexpected<Error> refuse(const CommandRequest& request, Error error);
 
   boost::asio::io_context& loop;
@@ -60,11 +67,17 @@ struct StationParts {
   EmergencyStops stops{loop, clock, tracker.recent()};
   TimedCommands timed{loop, clock, notifier, tracker};
   EventLimit enrolment_refusals{kEventPeriodUs};  // of robots that are not known, whatever their names are
-  std::uint64_t invalid_values = 0;               // of all robots, since the station started
-  std::uint64_t events_left_out = 0;              // likewise
-  runtime::TimeHistogram round_trips;             // likewise
-  SampleBatch batch;                              // of the frame that is being received; kept for its memory
+  // Of all robots, since the station started.
+  std::uint64_t invalid_values = 0;
+  std::uint64_t events_left_out = 0;
+  runtime::TimeHistogram round_trips;
+  SampleBatch batch;  // of the frame that is being received; kept for its memory
   std::function<void(const RobotState&, const Author&)> on_fluid_named = [](const RobotState&, const Author&) {};
+
+ private:
+  void leave_out(RobotEntry& entry, std::uint64_t event_seq);
+  void report_left_out(RobotEntry& entry, bool at_once);
+  std::string left_out_text(const LeftOutCount::Report& left_out) const;
 };
 
 }  // namespace server::station

@@ -1,4 +1,5 @@
-// Bounds how many events of one robot are recorded: a burst, and then so many a second. The others are counted.
+// Bounds how many events and connections of one robot are recorded: a burst, and then one in each period. The others
+// are counted.
 //
 // Events of safety have an allowance of their own, so that no flood of others keeps them out. Plain bookkeeping; times
 // are the caller's, steady.
@@ -28,44 +29,75 @@ constexpr bool is_of_safety(protocol::EventKind kind) {
   }
 }
 
+// A burst, and then one in each period.
+class Allowance {
+ public:
+  constexpr Allowance(std::int64_t burst, std::int64_t period_us) : burst_{burst}, period_us_{period_us} {}
+
+  // False: it is too many.
+  bool take(std::int64_t now_us) {
+    const std::int64_t next_us = std::max(full_at_us_, now_us) + period_us_;
+    if (next_us - now_us > burst_ * period_us_) return false;
+    full_at_us_ = next_us;
+    return true;
+  }
+
+ private:
+  std::int64_t burst_, period_us_;
+  std::int64_t full_at_us_ = 0;  // when the whole burst is there again
+};
+
 class EventAllowance {
  public:
   static constexpr std::int64_t kBurst = 1000;
   static constexpr std::int64_t kASecond = 50;  // a setpoint each 20 ms
+
+  bool take(protocol::EventKind kind, std::int64_t now_us) {
+    return (is_of_safety(kind) ? safety_ : others_).take(now_us);
+  }
+
+ private:
+  static constexpr std::int64_t kOneEachUs = 1'000'000 / kASecond;
+
+  Allowance safety_{kBurst, kOneEachUs}, others_{kBurst, kOneEachUs};
+};
+
+// A connection is recorded with its beginning and its end, or not at all.
+class ConnectionAllowance {
+ public:
+  static constexpr std::int64_t kBurst = 60;
+  static constexpr std::int64_t kAMinute = 30;
+
+  bool take(std::int64_t now_us) { return connections_.take(now_us); }
+
+ private:
+  Allowance connections_{kBurst, 60'000'000 / kAMinute};
+};
+
+// Counts those that were left out since the last report.
+class LeftOutCount {
+ public:
   static constexpr std::int64_t kReportPeriodUs = 10'000'000;
 
-  // Those that were left out since the last report.
-  struct LeftOut {
+  struct Report {
     std::uint64_t count = 0;
     std::int64_t first_us = 0, last_us = 0;  // steady
   };
 
-  // False: it is too many.
-  bool take(protocol::EventKind kind, std::int64_t now_us) {
-    std::int64_t& full_at_us = is_of_safety(kind) ? safety_full_at_us_ : others_full_at_us_;
-    const std::int64_t next_us = std::max(full_at_us, now_us) + kOneEachUs;
-    if (next_us - now_us > kBurst * kOneEachUs) return false;
-    full_at_us = next_us;
-    return true;
-  }
-
-  void count_left_out(std::int64_t now_us) {
+  void add(std::int64_t now_us) {
     if (left_out_.count++ == 0) left_out_.first_us = now_us;
     left_out_.last_us = now_us;
   }
 
   // What is to be reported: a period after the first that was left out, or at once; none when none was.
-  std::optional<LeftOut> report(std::int64_t now_us, bool at_once) {
+  std::optional<Report> report(std::int64_t now_us, bool at_once) {
     const bool is_due = at_once || now_us - left_out_.first_us >= kReportPeriodUs;
     if (left_out_.count == 0 || !is_due) return std::nullopt;
     return std::exchange(left_out_, {});
   }
 
  private:
-  static constexpr std::int64_t kOneEachUs = 1'000'000 / kASecond;
-
-  std::int64_t safety_full_at_us_ = 0, others_full_at_us_ = 0;  // when the whole burst is there again
-  LeftOut left_out_;
+  Report left_out_;
 };
 
 }  // namespace server::station

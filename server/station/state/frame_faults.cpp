@@ -39,7 +39,7 @@ void check_finite(FrameFaults& faults, const char* field, float value, std::uint
 }
 
 void mend(protocol::Telemetry& batch, const FrameReach& reach, FrameFaults& faults) {
-  if (is_too_large(faults, "first_seq", batch.first_seq, reach.seq)) {
+  if (is_too_large(faults, "first_seq", batch.first_seq, reach.first_seq(batch))) {
     faults.is_unusable = true;
     faults.has_number = false;
     return;
@@ -63,25 +63,40 @@ void mend(protocol::Event& event, const FrameReach& reach, FrameFaults& faults) 
   if (is_too_large(faults, "event_seq", event.event_seq, reach.event_seq)) faults.has_number = false;
   if (is_above_its_own(faults, "oldest_event_seq", event.oldest_event_seq, event.event_seq)) event.oldest_event_seq = 0;
   const bool has_time = !is_too_large(faults, "event_robot_time_us", event.event_robot_time_us, reach.robot_time_us);
-  const bool has_sample = !is_too_large(faults, "sample_seq", event.sample_seq, reach.seq);
+  const bool has_sample = !is_too_large(faults, "sample_seq", event.sample_seq, reach.sample_seq());
   faults.is_unusable = !faults.has_number || !has_time || !has_sample;
 }
 
 }  // namespace
 
 FrameReach FrameReach::after(const protocol::Hello& hello, std::uint64_t robot_time_us) {
-  return {reach_from(hello.next_seq, kSeqLeap), reach_from(hello.next_event_seq, kSeqLeap),
-          reach_from(robot_time_us, kTimeLeapUs)};
+  return {.next_seq = hello.next_seq,
+          .sampled_at_us = robot_time_us,
+          .event_seq = reach_from(hello.next_event_seq, kEventLeap),
+          .robot_time_us = reach_from(robot_time_us, kTimeLeapUs)};
 }
 
 void FrameReach::advance(const protocol::RobotFrame& frame) {
   robot_time_us = std::max(robot_time_us, reach_from(frame.robot_time_us, kTimeLeapUs));
   if (frame.which_body == rheonaut_RobotFrame_telemetry_tag) {
-    seq = std::max(seq, reach_from(frame.body.telemetry.first_seq, kSeqLeap));
+    const protocol::Telemetry& batch = frame.body.telemetry;
+    next_seq = std::max(next_seq, batch.first_seq + batch.position_m_count);
+    if (batch.first_robot_time_us <= robot_time_us) sampled_at_us = std::max(sampled_at_us, batch.first_robot_time_us);
   } else if (frame.which_body == rheonaut_RobotFrame_event_tag) {
-    event_seq = std::max(event_seq, reach_from(frame.body.event.event_seq, kSeqLeap));
+    event_seq = std::max(event_seq, reach_from(frame.body.event.event_seq, kEventLeap));
   }
 }
+
+// A time or a period that cannot be says nothing of how many samples were made.
+std::uint64_t FrameReach::first_seq(const protocol::Telemetry& batch) const {
+  const std::uint64_t time_us = batch.first_robot_time_us;
+  const bool has_time = time_us > sampled_at_us && time_us <= robot_time_us;
+  const bool has_period = batch.period_us > 0 && batch.period_us <= kMaxPeriodUs;
+  const std::uint64_t made = has_time && has_period ? (time_us - sampled_at_us) / batch.period_us : 0;
+  return reach_from(next_seq, made + kSeqSlack);
+}
+
+std::uint64_t FrameReach::sample_seq() const { return reach_from(next_seq, kEventLeap); }
 
 FrameFaults mend(protocol::RobotFrame& frame, const FrameReach& reach) {
   FrameFaults faults;

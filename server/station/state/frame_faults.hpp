@@ -15,16 +15,25 @@ namespace server::station {
 // How far the numbers of a robot's next frame can have come. A robot counts without leaps, so one that is far ahead of
 // all before it cannot be: if it were taken, every true one after it would look old. Never above kMaxRobotNumber.
 struct FrameReach {
-  static constexpr std::uint64_t kSeqLeap = 1'000'000;         // beyond what any outage within a connection makes
-  static constexpr std::uint64_t kTimeLeapUs = 3'600'000'000;  // likewise
+  // Beyond what any outage within a connection makes.
+  static constexpr std::uint64_t kEventLeap = 1'000'000;
+  static constexpr std::uint64_t kTimeLeapUs = 3'600'000'000;
+  // How much further than by its time a sample's number may be; a false one that is taken keeps its boot from
+  // connecting again until that number is reached: at 100 Hz for a minute at most.
+  static constexpr std::uint64_t kSeqSlack = 6'000;
 
-  std::uint64_t seq = kMaxRobotNumber;
+  std::uint64_t next_seq = kMaxRobotNumber;  // after the latest sample
+  std::uint64_t sampled_at_us = 0;           // by then, in the robot's time
   std::uint64_t event_seq = kMaxRobotNumber;
   std::uint64_t robot_time_us = kMaxRobotNumber;
 
-  // Of the frames after a hello or after this frame, which was mended.
+  // Of the frames after a hello, or after this frame, which was mended and has a number.
   static FrameReach after(const protocol::Hello& hello, std::uint64_t robot_time_us);
   void advance(const protocol::RobotFrame& frame);
+
+  // The largest that these can be: the first_seq of this batch, the sample_seq of an event.
+  std::uint64_t first_seq(const protocol::Telemetry& batch) const;
+  std::uint64_t sample_seq() const;
 };
 
 struct FrameFaults {

@@ -151,6 +151,31 @@ TEST_F(InvalidValuesTest, ANumberFarBeyondAllBeforeItMakesNoTrueOneOld) {
   EXPECT_TRUE(station.find("r1")->latched()) << "what is true is live";
 }
 
+TEST_F(InvalidValuesTest, ANumberThatLeapsWithoutItsTimeKeepsNoTrueOneOut) {
+  auto* robot = connect();
+  robot->send(samples(0, [](auto&) {}));
+  robot->send(samples(500'000, [](auto&) {}));  // a boot that was stored so far could not connect again for 83 min
+  robot->send(samples(5, [](auto&) {}));
+  clock.settle();
+  EXPECT_FALSE(robot->closed);
+  ASSERT_EQ(sink.batches.size(), 2u);
+  EXPECT_EQ(sink.batches[1].first_seq, 5u);
+  EXPECT_EQ(station.find("r1")->next_seq, 10u) << "the true ones are live";
+  EXPECT_EQ(station.find("r1")->invalid_values, 1u);
+  EXPECT_TRUE(unusable.samples.empty()) << "none is counted as lost: nobody can say which these are";
+}
+
+TEST_F(InvalidValuesTest, SamplesThatNeverHaveATimeAreLostForGoodHoweverManyTheyAre) {
+  auto* robot = connect();
+  constexpr std::uint64_t kMany = 2 * station::FrameReach::kSeqSlack;
+  for (std::uint64_t seq = 0; seq < kMany; seq += 5) {
+    robot->send(samples(seq, [](auto& frame) { frame.body.telemetry.first_robot_time_us = kFar; }));
+    clock.settle();
+  }
+  ASSERT_EQ(unusable.samples.size(), kMany / 5);
+  EXPECT_EQ(unusable.samples.back(), (std::pair{kMany - 5, kMany}));
+}
+
 TEST_F(InvalidValuesTest, OfARobotWhoseFramesDoNotDecodeAStopIsRepeatedAndCommandsEnd) {
   auto* robot = dial();
   robot->say_hello();
@@ -221,6 +246,31 @@ TEST_F(FrameFaultsTest, NoNumberIsBeyondWhatCanBeStoredHoweverFarTheRobotHasCome
   EXPECT_TRUE(station::mend(event, reach).event);
   event.body.event.event_seq = station::kMaxRobotNumber + 1;
   EXPECT_FALSE(station::mend(event, reach).event);
+}
+
+// 100 samples were made before the hello, which said 10 s.
+TEST_F(FrameFaultsTest, ANumberIsNotFurtherThanItsTimeAllows) {
+  constexpr std::uint64_t kSlack = station::FrameReach::kSeqSlack;
+  constexpr std::uint64_t kSecondUs = 1'000'000, kHelloUs = 10 * kSecondUs;
+  protocol::Hello hello = rheonaut_Hello_init_zero;
+  hello.next_seq = 100;
+  station::FrameReach reach = station::FrameReach::after(hello, kHelloUs);
+  const auto is_taken = [&reach](std::uint64_t first_seq, std::uint64_t time_us) {
+    protocol::RobotFrame frame = samples(first_seq, 0, time_us);
+    const station::FrameFaults faults = station::mend(frame, reach);
+    EXPECT_EQ(faults.has_number, faults.samples.has_value());
+    return faults.samples.has_value();
+  };
+  EXPECT_TRUE(is_taken(0, kSecondUs)) << "from the ring";
+  EXPECT_TRUE(is_taken(100 + kSlack, kHelloUs));
+  EXPECT_FALSE(is_taken(101 + kSlack, kHelloUs));
+  EXPECT_FALSE(is_taken(101 + kSlack, kSecondUs));
+  EXPECT_TRUE(is_taken(100 + 360'000, kHelloUs + 3'600 * kSecondUs)) << "an outage of an hour";
+  EXPECT_FALSE(is_taken(101 + 360'000 + kSlack, kHelloUs + 3'600 * kSecondUs));
+  reach.advance(samples(3'000, 0, kHelloUs + 29 * kSecondUs));
+  EXPECT_TRUE(is_taken(3'005 + kSlack, kHelloUs + 29 * kSecondUs));
+  EXPECT_FALSE(is_taken(3'006 + kSlack, kHelloUs + 29 * kSecondUs)) << "it counts from the latest";
+  EXPECT_TRUE(is_taken(3'005 + kSlack + 100, kHelloUs + 30 * kSecondUs));
 }
 
 TEST_F(FrameFaultsTest, TheOldestThatARobotHoldsIsNotAboveWhatItSends) {

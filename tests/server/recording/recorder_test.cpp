@@ -330,6 +330,29 @@ TEST_F(RecorderTest, CountsABatchOfABootThatIsNotRecorded) {
   EXPECT_EQ(recorder_->counters().batches_malformed, 1u);
 }
 
+TEST_F(RecorderTest, ABootThatConnectsAgainAndAgainAddsNoRow) {
+  start();
+  connect(robot_);
+  make(robot_, 10);
+  disconnect(robot_);
+  flush();
+  const auto all_rows = [this] {
+    std::vector<std::string> counts;
+    for (const std::string& table : rows("SELECT name FROM sqlite_master WHERE type = 'table' ORDER BY name")) {
+      counts.push_back(table + " " + std::to_string(number("SELECT count(*) FROM " + table)));
+    }
+    return counts;
+  };
+  const std::vector<std::string> before = all_rows();
+  for (int n = 0; n < 100; ++n) {
+    connect(robot_);
+    disconnect(robot_);
+    clock_.run_for(200ms);
+  }
+  flush();
+  EXPECT_EQ(all_rows(), before);
+}
+
 TEST_F(RecorderTest, KeepsNoBookkeepingOfBootsThatAreGone) {
   start();
   connect(robot_);
