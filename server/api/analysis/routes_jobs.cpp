@@ -206,7 +206,8 @@ http::Answer get_job(JobRoutes parts, http::Request request) {
 std::string content_type_of(const std::string& ending) {
   if (ending == "html") return "text/html; charset=utf-8";
   if (ending == "csv") return "text/csv; charset=utf-8";
-  return ending == "mat" ? "application/x-matlab-data" : "application/vnd.sqlite3";
+  if (ending == "mat") return "application/x-matlab-data";
+  return ending == "sqlite" ? "application/vnd.sqlite3" : "application/octet-stream";  // and MCAP, as of a run
 }
 
 http::Answer get_job_file(JobRoutes parts, http::Request request) {

@@ -108,7 +108,10 @@ http::Answer keep_alive(ExperimentRoutes parts, http::Request request) {
   if (!stamp_us) co_return http::problem(stamp_us.error());
   const std::int64_t now_us = parts.clock.steady_us();
   const auto view = parts.experiments.summary(*id);
-  if (!view) co_return http::problem(409, "it has ended", "wrong_state");
+  if (!view) {
+    const auto ended = co_await parts.experiments.find(*id);
+    co_return ended ? http::problem(409, "it has ended", "wrong_state") : http::problem(ended.error());
+  }
   const std::string& actor = view->experiment.acts_for;
   if (actor != request.actor) {
     co_return http::problem(409, fmt::format("it acts in the name of {}", actor), "acts_for_another");

@@ -171,12 +171,17 @@ asio::awaitable<Result<ExperimentView>> Experiments::wait_for_change(ExperimentI
 
 // --- what changes one ---
 
-Result<Experiments::Entry*> Experiments::entry_of(ExperimentId id) {
+// Null when it has ended, or there never was one.
+Experiments::Entry* Experiments::entry_of(ExperimentId id) {
   const auto found = entries_.find(id);
-  if (found == entries_.end()) {
-    return fail(ErrorCode::conflict, fmt::format("experiment {} is not there, or has ended", id), "wrong_state");
-  }
-  return &found->second;
+  return found == entries_.end() ? nullptr : &found->second;
+}
+
+// Of one without an entry.
+asio::awaitable<Result<ExperimentView>> Experiments::refuse(ExperimentId id, const char* what) {
+  const auto view = co_await find(id);
+  if (!view) co_return std::unexpected{view.error()};
+  co_return wrong_state(*view, what);
 }
 
 std::optional<ExperimentView> Experiments::summary(ExperimentId id) const {
@@ -196,12 +201,12 @@ station::AuditNote Experiments::note_of(const Entry& entry, const char* what, co
 
 // What was done is on disk, with its entry in the audit, when it is answered.
 asio::awaitable<Result<ExperimentView>> Experiments::stored(ExperimentId id, station::AuditNote note) {
-  const auto entry = entry_of(id);
-  if (!entry) co_return co_await find(id);
-  auto store = [experiment = (*entry)->experiment, note = std::move(note)](storage::Database& database) {
+  Entry* entry = entry_of(id);
+  if (entry == nullptr) co_return co_await find(id);
+  auto store = [experiment = entry->experiment, note = std::move(note)](storage::Database& database) {
     storage::store_experiment(database, experiment, note);
   };
-  publish(**entry);
+  publish(*entry);
   wake_.notify();
   co_await writer_.keep("the state of an experiment", std::move(store));
   co_return co_await find(id);
@@ -209,41 +214,41 @@ asio::awaitable<Result<ExperimentView>> Experiments::stored(ExperimentId id, sta
 
 asio::awaitable<Result<ExperimentView>> Experiments::pause(ExperimentId id, station::Author by) {
   by.at_us = parts_.clock.utc_us();
-  const auto entry = entry_of(id);
-  if (!entry) co_return std::unexpected{entry.error()};
+  Entry* entry = entry_of(id);
+  if (entry == nullptr) co_return co_await refuse(id, "paused");
   // SAFETY: also one that is paused by itself, which would go on by itself.
-  const ExperimentState state = state_of(**entry);
+  const ExperimentState state = state_of(*entry);
   const bool is_at_work = state == ExperimentState::running || state == ExperimentState::paused;
-  if (!is_at_work || !(*entry)->conduct) co_return wrong_state(view_of(**entry), "paused");
-  (*entry)->conduct->pause({"requested", fmt::format("{} has paused it", by.actor)});
-  co_return co_await stored(id, note_of(**entry, "paused", by));
+  if (!is_at_work || !entry->conduct) co_return wrong_state(view_of(*entry), "paused");
+  entry->conduct->pause({"requested", fmt::format("{} has paused it", by.actor)});
+  co_return co_await stored(id, note_of(*entry, "paused", by));
 }
 
 asio::awaitable<Result<ExperimentView>> Experiments::resume(ExperimentId id, station::Author by) {
   by.at_us = parts_.clock.utc_us();
-  const auto entry = entry_of(id);
-  if (!entry) co_return std::unexpected{entry.error()};
-  Experiment& experiment = (*entry)->experiment;
+  Entry* entry = entry_of(id);
+  if (entry == nullptr) co_return co_await refuse(id, "resumed");
+  Experiment& experiment = entry->experiment;
   if (experiment.acts_for != by.actor) {
     co_return fail(ErrorCode::conflict,
                    fmt::format("it acts in the name of {}; take it over to go on with it", experiment.acts_for),
                    "acts_for_another");
   }
-  const ExperimentState state = state_of(**entry);
+  const ExperimentState state = state_of(*entry);
   const bool is_held = state == ExperimentState::waiting && experiment.is_held;
-  if (state != ExperimentState::paused && !is_held) co_return wrong_state(view_of(**entry), "resumed");
+  if (state != ExperimentState::paused && !is_held) co_return wrong_state(view_of(*entry), "resumed");
   experiment.is_held = false;
   experiment.reason.clear();
-  if ((*entry)->conduct) (*entry)->conduct->resume();
-  co_return co_await stored(id, note_of(**entry, "resumed", by));
+  if (entry->conduct) entry->conduct->resume();
+  co_return co_await stored(id, note_of(*entry, "resumed", by));
 }
 
 // SAFETY: first the robot, then the database.
 asio::awaitable<Result<ExperimentView>> Experiments::abort(ExperimentId id, std::string reason, station::Author by) {
   by.at_us = parts_.clock.utc_us();
-  const auto found = entry_of(id);
-  if (!found) co_return std::unexpected{found.error()};
-  Entry& entry = **found;
+  Entry* found = entry_of(id);
+  if (found == nullptr) co_return co_await refuse(id, "aborted");
+  Entry& entry = *found;
   const std::string detail =
       reason.empty() ? fmt::format("{} has ended it", by.actor) : fmt::format("{} has ended it: {}", by.actor, reason);
   if (entry.conduct) {
@@ -270,9 +275,9 @@ asio::awaitable<Result<ExperimentView>> Experiments::abort(ExperimentId id, std:
 
 asio::awaitable<Result<ExperimentView>> Experiments::take_over(ExperimentId id, station::Author by) {
   by.at_us = parts_.clock.utc_us();
-  const auto found = entry_of(id);
-  if (!found) co_return std::unexpected{found.error()};
-  Entry& entry = **found;
+  Entry* found = entry_of(id);
+  if (found == nullptr) co_return co_await refuse(id, "taken over");
+  Entry& entry = *found;
   const ExperimentState state = state_of(entry);
   if (state == ExperimentState::aborting || storage::has_ended(state)) {
     co_return wrong_state(view_of(entry), "taken over");
@@ -307,9 +312,9 @@ asio::awaitable<Result<ExperimentView>> Experiments::take_over(ExperimentId id, 
 asio::awaitable<Result<ExperimentView>> Experiments::move(ExperimentId id, ExperimentId before, std::int64_t priority,
                                                           station::Author by) {
   by.at_us = parts_.clock.utc_us();
-  const auto found = entry_of(id);
-  if (!found) co_return std::unexpected{found.error()};
-  Entry& entry = **found;
+  Entry* found = entry_of(id);
+  if (found == nullptr) co_return co_await refuse(id, "moved");
+  Entry& entry = *found;
   if (entry.conduct) co_return wrong_state(view_of(entry), "moved");
   std::vector<Entry*> queue = queue_of(entry.experiment.request.robot_id);
   std::erase(queue, &entry);

@@ -65,7 +65,7 @@ class Experiments final : public station::StationSink {
   // As find(), once its state is another one than `known`, or so much later.
   boost::asio::awaitable<Result<ExperimentView>> wait_for_change(storage::ExperimentId id, microseconds patience);
 
-  // By people. conflict: its state forbids it. Each is in the audit.
+  // By people. not_found; conflict: its state forbids it. Each is in the audit.
   boost::asio::awaitable<Result<ExperimentView>> pause(storage::ExperimentId id, station::Author by);
   boost::asio::awaitable<Result<ExperimentView>> resume(storage::ExperimentId id, station::Author by);
   boost::asio::awaitable<Result<ExperimentView>> abort(storage::ExperimentId id, std::string reason,
@@ -127,7 +127,8 @@ class Experiments final : public station::StationSink {
   WaitReason reserved_for_another(const storage::Experiment& experiment) const;  // empty: it is not, or not that soon
   void abort_if_reserved(const station::RobotId& robot_id);
   std::vector<Entry*> queue_of(const station::RobotId& robot_id);
-  Result<Entry*> entry_of(storage::ExperimentId id);
+  Entry* entry_of(storage::ExperimentId id);
+  boost::asio::awaitable<Result<ExperimentView>> refuse(storage::ExperimentId id, const char* what);
   Result<void> check_request(const storage::ExperimentRequest& request) const;
   storage::ExperimentState state_of(const Entry& entry) const;
   ExperimentView summary_of(const Entry& entry) const;

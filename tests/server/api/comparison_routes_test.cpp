@@ -228,6 +228,15 @@ TEST_F(ComparisonTest, ReportsAndExportsOfJobsAreFiles) {
   EXPECT_TRUE(ask("GET", "/api/v1/jobs/4/file").body.starts_with("SQLite format 3"));
   done({{"kind", "export"}, {"run_id", 1}, {"format", "mat"}, {"grid_us", 20'000}});
   EXPECT_GT(ask("GET", "/api/v1/jobs/5/file").body.size(), 1000U);
+  done({{"kind", "export"}, {"run_id", 1}, {"format", "mcap"}});
+  const std::pair<int, const char*> types[] = {{1, "text/html; charset=utf-8"},
+                                               {3, "text/csv; charset=utf-8"},
+                                               {4, "application/vnd.sqlite3"},
+                                               {5, "application/x-matlab-data"},
+                                               {6, "application/octet-stream"}};
+  for (const auto& [number, type] : types) {
+    EXPECT_EQ(ask("GET", fmt::format("/api/v1/jobs/{}/file", number)).response.content_type, type);
+  }
   for (const auto& entry : std::filesystem::directory_iterator{folder.path() / "job-files"}) {
     EXPECT_FALSE(entry.path().string().contains(".part")) << entry.path();
   }

@@ -127,7 +127,7 @@ TEST_F(ExperimentRoutesTest, ARedButtonEndsItAndSeesNothingOfIt) {
 TEST_F(ExperimentRoutesTest, WhatIsNotThereOrHasEnded) {
   for (const char* act : {"keep-alive", "pause", "resume", "abort", "take-over", "move"}) {
     const json body = std::string{act} == "move" ? json::object() : json(nullptr);
-    EXPECT_EQ(ask("POST", fmt::format("/api/v1/experiments/9/{}", act), body).status, 409) << act;
+    EXPECT_EQ(ask("POST", fmt::format("/api/v1/experiments/9/{}", act), body).status, 404) << act;
     EXPECT_EQ(ask("POST", fmt::format("/api/v1/experiments/x/{}", act), body).status, 404) << act;
   }
   EXPECT_EQ(ask("GET", "/api/v1/experiments/9").status, 404);
@@ -136,6 +136,13 @@ TEST_F(ExperimentRoutesTest, WhatIsNotThereOrHasEnded) {
   EXPECT_EQ(ask("POST", "/api/v1/experiments/1/pause").status, 409) << "it waits";
   EXPECT_EQ(ask("POST", "/api/v1/experiments/1/resume").status, 409) << "it is not held";
   EXPECT_EQ(ask("POST", "/api/v1/experiments/1/move", {{"before", 9}}).status, 422);
+  ASSERT_EQ(ask("POST", "/api/v1/experiments/1/abort").status, 200);
+  for (const char* act : {"keep-alive", "pause", "resume", "abort", "take-over", "move"}) {
+    const json body = std::string{act} == "move" ? json::object() : json(nullptr);
+    const Answered ended = ask("POST", fmt::format("/api/v1/experiments/1/{}", act), body);
+    EXPECT_EQ(ended.status, 409) << act;
+    EXPECT_EQ(ended.parsed()["reason"], "wrong_state") << act;
+  }
 }
 
 TEST_F(ExperimentRoutesTest, APageGivesNoSignOfLifeByARequest) {
