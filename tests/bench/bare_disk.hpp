@@ -55,7 +55,7 @@ class Disk {
     advance_row_ = prepare("UPDATE meta SET value = ? WHERE name = 'next_row'");
     advance_boot_ = prepare("UPDATE boot SET last_robot_time_us = ? WHERE boot_key = ?");
     thread_ = std::thread{[this, in_real_time] {
-      if (in_real_time) server::runtime::ask_for_real_time(server::runtime::Priority::disk);
+      if (in_real_time) server::runtime::set_priority(server::runtime::Priority::disk);
       work();
     }};
   }

@@ -372,7 +372,7 @@ int main(int argc, char** argv) try {
   const std::string what = argv[1];
   const bool keeps = !what.starts_with("--");
   BareLoop loop{keeps ? std::make_unique<bare::Disk>(what, in_real_time) : nullptr, what != "--bytes"};
-  if (in_real_time && !server::runtime::ask_for_real_time(server::runtime::Priority::loop))
+  if (in_real_time && !server::runtime::set_priority(server::runtime::Priority::loop))
     throw std::runtime_error{"no real-time priority"};
   std::cout << loop.port() << ' ' << loop.http_port() << std::endl;
   loop.run();
