@@ -37,9 +37,11 @@ interface Press {
   robot_id: string | null;
   key: string;
   pressed_at_ms: number;
+  failed_at_ms: number | null; // the latest try; null: it is on its way
 }
 
 export const kLate_ms = 1000;
+export const kAgain_ms = 1000; // after a try that the station has not answered
 export const kKept_ms = 600_000; // a press that could not be sent goes by itself no later than this
 export const kIdleStop: StopState = {
   phase: 'idle',
@@ -58,7 +60,8 @@ export class EmergencyStop {
   constructor(private readonly ways: StopWays) {}
 
   async stop(robot_id: string | null): Promise<void> {
-    const press = { number: ++this.press, robot_id, key: new_key(), pressed_at_ms: this.ways.now_ms() };
+    const pressed_at_ms = this.ways.now_ms();
+    const press = { number: ++this.press, robot_id, key: new_key(), pressed_at_ms, failed_at_ms: null };
     this.kept.set(robot_id, press);
     return this.send(press, true);
   }
@@ -66,16 +69,27 @@ export class EmergencyStop {
   // The station is back: what it may never have received goes once more, under the same key, so that one press is one stop.
   // Not a press of long ago: the person who made it has done something else since.
   again(): void {
+    for (const press of [...this.kept.values()]) this.send_again(press);
+  }
+
+  // SAFETY: a station that is too busy, or a proxy in its place, may answer while the link stays up.
+  private again_after_failure(): void {
+    const failed_before_ms = this.ways.now_ms() - kAgain_ms;
     for (const press of [...this.kept.values()]) {
-      const is_old = this.ways.now_ms() - press.pressed_at_ms > kKept_ms;
-      const found = this.ways.evidence(press.robot_id, press.pressed_at_ms);
-      if (is_old || is_complete(found) || (found.open === 0 && found.cleared > 0)) this.drop(press);
-      else void this.send(press, false);
+      if (press.failed_at_ms !== null && press.failed_at_ms <= failed_before_ms) this.send_again(press);
     }
+  }
+
+  private send_again(press: Press): void {
+    const is_old = this.ways.now_ms() - press.pressed_at_ms > kKept_ms;
+    const found = this.ways.evidence(press.robot_id, press.pressed_at_ms);
+    if (is_old || is_complete(found) || (found.open === 0 && found.cleared > 0)) this.drop(press);
+    else void this.send(press, false);
   }
 
   private async send(press: Press, is_first: boolean): Promise<void> {
     const { robot_id, key, pressed_at_ms } = press;
+    press.failed_at_ms = null;
     // SAFETY: both leave in this very call, before anything is drawn.
     const by_socket = sent_without_throwing(() => this.ways.over_socket(robot_id, key));
     const answer = this.ways.over_http(robot_id, key);
@@ -98,6 +112,7 @@ export class EmergencyStop {
     } catch (error) {
       const problem = error instanceof Error ? error.message : String(error);
       if (this.ways.was_answered(error)) this.drop(press);
+      press.failed_at_ms = this.ways.now_ms();
       settle({
         phase: 'failed',
         problem: by_socket ? `Sent over the live link; the second way failed: ${problem}` : problem,
@@ -112,6 +127,7 @@ export class EmergencyStop {
 
   // Called again and again: telemetry settles what no answer has settled, and shows when the latch is gone.
   look(): void {
+    this.again_after_failure();
     const { phase, robot_id, pressed_at_ms } = this.state;
     if (phase === 'idle') return;
     if (phase === 'sent') {

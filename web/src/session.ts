@@ -39,7 +39,7 @@ export class Session {
     () => this.link.stamp_us,
   );
   readonly experiments = new ExperimentsApi((method, path, body) => this.api.ask(method, path, body));
-  readonly store = new Store({ page_ms: () => performance.now(), utc_ms: () => Date.now() });
+  readonly store = new Store({ page_ms: () => performance.now(), utc_ms: () => this.utc_us() / 1000 });
   readonly settings = new ViewSettings(browser_shelf());
   readonly station = signal<Station | null>(null);
   readonly fluids = signal<Fluid[] | null>(null); // that a robot may be in; null: the station has no list of them
@@ -110,6 +110,9 @@ export class Session {
       on_change: () => this.on_hold(),
     });
   }
+
+  // By the station's clock: what the station dates is compared with it.
+  utc_us = (): number => this.path.utc_s(performance.now()) * 1e6;
 
   private refreshed_at_ms = 0;
   private let_pass = false;
@@ -225,7 +228,8 @@ export class Session {
 
   private async load_recording(): Promise<void> {
     if (this.phase.peek() !== 'live') return;
-    if (this.me.peek() === null) void this.load(); // the answer did not come in time: without it nobody has controls
+    // An answer did not come in time: without them nobody has controls, or knows whether a run is open.
+    if (this.me.peek() === null || !this.store.are_runs_known.peek()) void this.load();
     const asked_at_ms = performance.now();
     const recording = await this.api.recording().catch(() => null);
     if (recording) this.take_recording(recording, asked_at_ms);
@@ -335,7 +339,7 @@ export class Session {
     }
     if (before === 'live') {
       this.store.is_current.value = false;
-      this.store.set_runs([]); // asked for anew when the station is back
+      this.store.forget_runs();
       this.hold.release();
       this.store.note('The live connection was lost.');
     } else if (now === 'live') {

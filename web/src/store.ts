@@ -36,6 +36,7 @@ export class Store {
   // The page receives from the station. While it does not, it does not know who is in control, nor whether a run is open.
   readonly is_current = signal(false);
   readonly runs = signal<RunRecord[]>([]); // that are open, at most one for each robot
+  readonly are_runs_known = signal(false); // since the station listed them
   readonly interrupted = signal<RunRecord[]>([]); // of each robot its newest run, if the station stopped in it
   private run_reports = 0; // so far
   private readonly runs_reported = new Map<number, number>(); // of each run: the number of its latest report
@@ -118,7 +119,14 @@ export class Store {
   // All that are open, as the station has listed them.
   set_runs(open: RunRecord[], asked_at = this.mark()): void {
     const is_newer = ({ run_id }: RunRecord) => (this.runs_reported.get(run_id) ?? 0) > asked_at;
+    this.are_runs_known.value = true;
     this.runs.value = [...open.filter((run) => !is_newer(run)), ...this.runs.peek().filter(is_newer)];
+  }
+
+  // Cut off: what is open is asked for anew.
+  forget_runs(): void {
+    this.are_runs_known.value = false;
+    this.runs.value = [];
   }
 
   take_run_answer(run: RunRecord, asked_at: number): void {

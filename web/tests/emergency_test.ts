@@ -1,7 +1,7 @@
 // The emergency stop and its key.
 import { expect, test } from 'vitest';
 import type { CommandRecord } from '../src/api';
-import { EmergencyStop, kKept_ms, kLate_ms, type StopState } from '../src/emergency';
+import { EmergencyStop, kAgain_ms, kKept_ms, kLate_ms, type StopState } from '../src/emergency';
 import { kFullScreenNote, kShortcuts, listen_for_stop_key } from '../src/keys';
 import { outcome_of, type StopEvidence } from '../src/stop_outcome';
 import { settle } from './fakes';
@@ -251,6 +251,30 @@ test('one that was refused, that telemetry has shown, or that is old, does not g
     emergency.again();
     expect(world.ways).toHaveLength(2);
   }
+});
+
+// SAFETY: a busy station or a proxy answers while the live link stays as it is, so that no welcome comes.
+test('a press that nothing has answered goes again each second, as the same press, until it is answered', async () => {
+  const failures = [new Error('busy'), new Error('busy')];
+  const { emergency, world } = stop_with(() => {
+    const failure = failures.shift();
+    return failure ? Promise.reject(failure) : Promise.resolve([record('verified')]);
+  });
+  await emergency.stop('rheo-1');
+  for (const [after_ms, tries] of [
+    [kAgain_ms - 1, 1],
+    [kAgain_ms, 2],
+    [2 * kAgain_ms - 1, 2],
+    [2 * kAgain_ms, 3],
+    [9 * kAgain_ms, 3],
+  ] as const) {
+    world.now_ms = after_ms;
+    emergency.look();
+    await settle();
+    expect([after_ms, world.ways.filter((way) => way.startsWith('http')).length]).toEqual([after_ms, tries]);
+  }
+  expect(new Set(world.keys).size).toBe(1);
+  expect(emergency.state.phase).toBe('stopped');
 });
 
 test('each robot has its own press that goes again', async () => {

@@ -19,7 +19,7 @@ afterEach(() => {
   vi.useRealTimers();
 });
 
-async function drawn() {
+async function drawn(are_runs_known = true) {
   const store = new Store({ page_ms: () => 0, utc_ms: () => 0 });
   const state = {
     robot_id: 'a',
@@ -40,9 +40,11 @@ async function drawn() {
     robots: [state as unknown as RobotState],
   });
   store.is_current.value = true;
+  if (are_runs_known) store.set_runs([]);
   store.refresh();
   const session = {
     store,
+    utc_us: () => 0,
     fluids: signal(null),
     me: signal({ role: 'operator' }),
     settings: { dismissed: { names: signal(new Set<string>()) } },
@@ -54,10 +56,14 @@ async function drawn() {
   const page = new FakeNode(1, 'body');
   render(h(RunControl, { session, robot: store.selected.value! }), page as unknown as Element);
   const settle = () => vi.advanceTimersByTimeAsync(100);
-  page.find('run-name')!.fire('Input', { currentTarget: { value: 'half a name' } });
+  page.find('run-name')?.fire('Input', { currentTarget: { value: 'half a name' } });
   await settle();
   const typed = () => page.find('run-name')?.attributes['value'] ?? null;
-  return { page, store, settle, typed };
+  const again = () => {
+    render(null, page as unknown as Element);
+    render(h(RunControl, { session, robot: store.selected.value! }), page as unknown as Element);
+  };
+  return { page, store, settle, typed, again };
 }
 
 test('it is there again after the connection was lost', async () => {
@@ -69,6 +75,26 @@ test('it is there again after the connection was lost', async () => {
   store.is_current.value = true;
   await settle();
   expect(typed()).toBe('half a name');
+});
+
+test('it is there again after another view was looked at', async () => {
+  const { settle, typed, again } = await drawn();
+  again();
+  await settle();
+  expect(typed()).toBe('half a name');
+});
+
+test('until the station has listed its runs the page does not say that none is open', async () => {
+  const { page, store, settle, typed } = await drawn(false);
+  expect(typed()).toBeNull();
+  expect(page.find('run-unknown')).not.toBeNull();
+  store.set_runs([]);
+  await settle();
+  expect(page.find('run-unknown')).toBeNull();
+  expect(typed()).not.toBeNull();
+  store.forget_runs();
+  await settle();
+  expect(page.find('run-unknown')).not.toBeNull();
 });
 
 test('it is gone once a run has that name', async () => {

@@ -1,6 +1,6 @@
 // Auto: the setpoint in millimetres, and the key that engages it.
 
-import { useSignal } from '@preact/signals';
+import { draft_of } from '../drafts';
 import { m_to_millimetres, millimetres, millimetres_to_m, parse_millimetres } from '../format';
 import type { Session } from '../session';
 import type { Robot } from '../robot';
@@ -11,15 +11,17 @@ const kSteps_mm = [-10, -1, 1, 10];
 export function AutoControl({ session, robot }: { session: Session; robot: Robot }) {
   const { robot_id, link } = robot.state.value;
   const { mode, setpoint_m } = robot.readout.value;
-  const draft = useSignal('100.0');
+  const draft = draft_of(session, robot_id, 'setpoint');
   const asking = useAsking();
   const in_auto = mode === 'auto';
   const possible = link === 'connected' && mode !== 'emergency';
-  const wanted_m = parse_millimetres(draft.value);
+  // Until something is typed: the setpoint in force, if there is one.
+  const typed = draft.value ?? (in_auto && setpoint_m !== null ? millimetres(setpoint_m) : '100.0');
+  const wanted_m = parse_millimetres(typed);
 
   const send = () => {
     if (!possible) return;
-    if (wanted_m === null) return asking.fail(`“${draft.value}” is not a length in millimetres.`);
+    if (wanted_m === null) return asking.fail(`“${typed}” is not a length in millimetres.`);
     const text = `${millimetres(wanted_m)} mm`;
     void (in_auto
       ? asking.ask(`Setpoint ${text}`, () => session.api.set_setpoint(robot_id, wanted_m))
@@ -58,7 +60,7 @@ export function AutoControl({ session, robot }: { session: Session; robot: Robot
               id="setpoint-entry"
               inputMode="decimal"
               autoComplete="off"
-              value={draft.value}
+              value={typed}
               aria-describedby="setpoint-outcome"
               aria-invalid={wanted_m === null}
               onInput={(event) => {

@@ -1,6 +1,6 @@
 // A disturbance: the robot adds a length to the position that its controller sees, as in Figure 7 of the paper.
 
-import { useSignal } from '@preact/signals';
+import { draft_of } from '../drafts';
 import { millimetres, parse_millimetres } from '../format';
 import type { Robot } from '../robot';
 import type { Session } from '../session';
@@ -9,15 +9,16 @@ import { OutcomeLine, useAsking } from './request';
 export function DisturbanceControl({ session, robot }: { session: Session; robot: Robot }) {
   const { robot_id, link } = robot.state.value;
   const { mode, disturbance_m } = robot.readout.value;
-  const draft = useSignal(`${'\u2212'}50.0`);
+  const draft = draft_of(session, robot_id, 'disturbance');
+  const typed = draft.value ?? '\u221250.0';
   const asking = useAsking();
   const possible = link === 'connected' && mode === 'auto' && !asking.pending;
-  const wanted_m = parse_millimetres(draft.value);
+  const wanted_m = parse_millimetres(typed);
   const is_disturbed = disturbance_m !== null && disturbance_m !== 0;
 
   const inject = (length_m: number | null) => {
     if (link !== 'connected' || mode !== 'auto') return;
-    if (length_m === null) return asking.fail(`“${draft.value}” is not a length in millimetres.`);
+    if (length_m === null) return asking.fail(`“${typed}” is not a length in millimetres.`);
     const what = length_m === 0 ? 'No disturbance' : `Disturbance of ${millimetres(length_m)} mm`;
     void asking.ask(what, () => session.api.inject_disturbance(robot_id, length_m));
   };
@@ -37,7 +38,7 @@ export function DisturbanceControl({ session, robot }: { session: Session; robot
               id="disturbance-entry"
               inputMode="decimal"
               autoComplete="off"
-              value={draft.value}
+              value={typed}
               aria-describedby="disturbance-outcome"
               aria-invalid={wanted_m === null}
               onInput={(event) => {

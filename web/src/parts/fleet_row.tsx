@@ -145,5 +145,5 @@ const kUnsaved = 300; // samples on their way to the disk; three seconds of one 
 
 function RunTime({ session, started_at_us }: { session: Session; started_at_us: number }) {
   void session.store.now_ms.value; // ten times a second
-  return <time>{duration(Date.now() - started_at_us / 1000)}</time>;
+  return <time>{duration((session.utc_us() - started_at_us) / 1000)}</time>;
 }

@@ -1,6 +1,6 @@
 // Manual: a duty that runs while the key is held, the way back from auto, and zeroing of the position.
 
-import { useSignal } from '@preact/signals';
+import { draft_of } from '../drafts';
 import { percent, percent_to_duty } from '../format';
 import type { Session } from '../session';
 import type { Robot } from '../robot';
@@ -11,7 +11,8 @@ import { OutcomeLine, useAsking } from './request';
 export function ManualControl({ session, robot }: { session: Session; robot: Robot }) {
   const { robot_id, link } = robot.state.value;
   const { mode, duty } = robot.readout.value;
-  const duty_percent = useSignal(20);
+  const draft = draft_of(session, robot_id, 'duty');
+  const duty_percent = Number(draft.value ?? 20);
   const asking = useAsking();
   const in_manual = mode === 'manual';
   const connected = link === 'connected';
@@ -34,7 +35,7 @@ export function ManualControl({ session, robot }: { session: Session; robot: Rob
         </button>
       )}
       <label for="duty-entry">
-        Duty <output class="figure">{percent(percent_to_duty(duty_percent.value), 0)} %</output>
+        Duty <output class="figure">{percent(percent_to_duty(duty_percent), 0)} %</output>
       </label>
       <input
         id="duty-entry"
@@ -43,12 +44,12 @@ export function ManualControl({ session, robot }: { session: Session; robot: Rob
         min={-100}
         max={100}
         step={1}
-        value={duty_percent.value}
+        value={duty_percent}
         onInput={(event) => {
-          duty_percent.value = event.currentTarget.valueAsNumber;
-          session.hold.change(percent_to_duty(duty_percent.value));
+          draft.value = event.currentTarget.value;
+          session.hold.change(percent_to_duty(event.currentTarget.valueAsNumber));
         }}
-        onDblClick={() => (duty_percent.value = 0)}
+        onDblClick={() => (draft.value = '0')}
       />
       <span class="duty-marks" aria-hidden="true">
         <i />
@@ -61,7 +62,7 @@ export function ManualControl({ session, robot }: { session: Session; robot: Rob
           class={`hold-to-run ${running ? 'running' : ''}`}
           disabled={!possible}
           described_by="hold-outcome"
-          on_press={() => session.hold.press(robot_id, percent_to_duty(duty_percent.value))}
+          on_press={() => session.hold.press(robot_id, percent_to_duty(duty_percent))}
           on_release={() => session.hold.release()}
         >
           {running ? 'Running: let go to stop' : 'Hold to run'}
@@ -80,7 +81,7 @@ export function ManualControl({ session, robot }: { session: Session; robot: Rob
         session={session}
         robot_id={robot_id}
         why_not={possible ? '' : connected && !in_manual ? 'it acts in manual.' : 'the robot cannot be driven now.'}
-        full_duty={percent_to_duty(duty_percent.value)}
+        full_duty={percent_to_duty(duty_percent)}
       />
       {(held.error || held.lapsed) && (
         <p class="outcome failed" id="hold-outcome" role="alert">

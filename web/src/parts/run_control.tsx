@@ -6,6 +6,7 @@ import type { RunRecord } from '../api';
 import { clock_time, duration, fluid_text } from '../format';
 import type { Robot } from '../robot';
 import type { Session } from '../session';
+import { draft_of } from '../drafts';
 import { Choice } from './choice';
 import { ModelLine } from './model_line';
 import { OutcomeLine, useAsking } from './request';
@@ -14,14 +15,14 @@ export function RunControl({ session, robot }: { session: Session; robot: Robot 
   const { store } = session;
   const { robot_id, link } = robot.state.value;
   const asking = useAsking();
-  const name = useSignal(''); // it outlasts the form, which is away while the page is cut off
+  const name = draft_of(session, robot_id, 'run');
   const run = store.runs.value.find((other) => other.robot_id === robot_id);
   const is_current = store.is_current.value;
 
   const start = (wanted: string, fluid: string) =>
     asking.ask('Run', async () => {
       store.take_run(await session.api.start_run(robot_id, wanted, fluid));
-      name.value = '';
+      name.value = null;
     });
   const set_fluid = (fluid: string) =>
     asking.ask('Fluid of the robot', () => session.api.set_fluid(robot_id, fluid === '' ? null : fluid));
@@ -35,6 +36,10 @@ export function RunControl({ session, robot }: { session: Session; robot: Robot 
       {!is_current ? (
         <p class="quiet" id="run-unknown">
           Cut off from the station: whether a run is open is not known.
+        </p>
+      ) : !run && !store.are_runs_known.value ? (
+        <p class="quiet" id="run-unknown">
+          Asking the station whether a run is open…
         </p>
       ) : run ? (
         <div class="pair">
@@ -74,7 +79,7 @@ export function RunControl({ session, robot }: { session: Session; robot: Robot 
 interface RunFormProps {
   session: Session;
   robot: Robot;
-  name: Signal<string>;
+  name: Signal<string | null>;
   disabled: boolean;
   on_start(name: string, fluid: string): void;
   on_fluid(fluid: string): Promise<boolean>; // it belongs to the robot
@@ -103,7 +108,7 @@ function RunForm({ session, robot, name, disabled, on_start, on_fluid }: RunForm
       class="run-form"
       onSubmit={(event) => {
         event.preventDefault();
-        on_start(name.value.trim(), fluid);
+        on_start((name.value ?? '').trim(), fluid);
       }}
     >
       {/* A browser offers earlier entries in a native list, which would keep the first Escape for itself. */}
@@ -113,7 +118,7 @@ function RunForm({ session, robot, name, disabled, on_start, on_fluid }: RunForm
         placeholder="Name"
         autoComplete="off"
         maxLength={200}
-        value={name.value}
+        value={name.value ?? ''}
         onInput={(event) => (name.value = event.currentTarget.value)}
       />
       <Choice id="run-fluid" label="Fluid" options={options} value={fluid} on_choose={pick} />
@@ -152,5 +157,5 @@ const kBuiltInFluids = ['non_newtonian', 'water'];
 
 function RunTime({ session, started_at_us }: { session: Session; started_at_us: number }) {
   void session.store.now_ms.value; // ten times a second
-  return <time>{duration(Date.now() - started_at_us / 1000)}</time>;
+  return <time>{duration((session.utc_us() - started_at_us) / 1000)}</time>;
 }

@@ -2,7 +2,7 @@
 import { expect, test } from 'vitest';
 import { kNothing } from '../../src/views/design/address';
 import { rounded, with_specification } from '../../src/views/design/ask';
-import type { MapPoint, Predicted } from '../../src/views/design/design_api';
+import type { MapPoint, Predicted, Pushed } from '../../src/views/design/design_api';
 import { log_splits, path_of, place_of } from '../../src/views/design/graph';
 import { identify_body } from '../../src/views/design/identify_step';
 import { float_text, push_state } from '../../src/views/design/push_step';
@@ -10,7 +10,8 @@ import { is_in_region, regions_of } from '../../src/views/design/region_map';
 import { line_of } from '../../src/views/design/step_plots';
 import { inside, summary_of } from '../../src/views/design/tune_result';
 import { tune_body } from '../../src/views/design/tune_step';
-import { predicted_for } from '../../src/views/design/verify_step';
+
+import { controller_note, predicted_for } from '../../src/views/design/verify_step';
 import { fixed_text, infeasible_text, number_text, state_of } from '../../src/views/design/words';
 
 test('what a hand asks is rounded and stays within the sliders', () => {
@@ -211,4 +212,12 @@ test('states, numbers and robustness in words', () => {
       { is_stable: false, is_diverging: false },
     ]),
   ).toBe('Not stable in 1 of 2 cases.');
+});
+
+test('a run is compared with the controller that the design has sent, not with what the robot runs now', () => {
+  const sent = { design_id: 4, verified: true, in_force: { controller: { checksum: 11 } } } as unknown as Pushed;
+  expect(controller_note(11, 4, sent)).toBeNull();
+  expect(controller_note(12, 4, sent)?.is_other).toBe(true);
+  for (const pushed of [null, { ...sent, design_id: 5 }, { ...sent, verified: false }])
+    expect(controller_note(11, 4, pushed)?.text).toMatch(/is not known/);
 });

@@ -50,6 +50,12 @@ test('a robot that is at rest, free and alone has nothing to wait for', () => {
   ]);
 });
 
+test('what is not known is not shown as ready', () => {
+  expect(check('rest', { robot: robot({ sample: null }) }).state).toBe('unknown');
+  expect(check('reservation', { reservations: null }).state).toBe('unknown');
+  expect(check('pump', { newest_run: undefined }).state).toBe('unknown');
+});
+
 test('what moves, is away or is latched is named with what to do', () => {
   expect(check('connected', { robot: robot({ link: 'disconnected' }) }).state).toBe('waits');
   expect(check('rest', { robot: robot({ link: 'disconnected' }) }).state).toBe('unknown');

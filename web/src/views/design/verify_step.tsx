@@ -6,7 +6,7 @@ import { millimetres, plus_minus } from '../../format';
 import { useAsked } from '../experiments/acts';
 import type { Step as StepMeasures } from '../runs/runs_api';
 import { change_design } from './address';
-import type { Measures, Predicted, Tuned } from './design_api';
+import type { Measures, Predicted, Pushed, Tuned } from './design_api';
 import type { StepProps } from './parts';
 import { Step } from './step';
 import { VerifyPlots } from './verify_plot';
@@ -29,6 +29,23 @@ export function predicted_for(
   return step.cause === 'disturbance' && is_of_size(-disturbance_m) ? predicted.disturbance : null;
 }
 
+// Whether a run was made with the controller that this design has sent; null: it was. What the robot runs now does not say.
+export function controller_note(
+  checksum: number,
+  design_id: number | null,
+  pushed: Pick<Pushed, 'design_id' | 'verified' | 'in_force'> | null,
+): { is_other: boolean; text: string } | null {
+  const is_of_design = pushed !== null && pushed.verified && pushed.design_id === design_id;
+  const sent = is_of_design ? pushed.in_force.controller?.checksum : undefined;
+  if (sent === undefined) {
+    return {
+      is_other: false,
+      text: 'Whether the run was made with this controller is not known: it was not sent from this page.',
+    };
+  }
+  return sent === checksum ? null : { is_other: true, text: 'The run was made with another controller than this one.' };
+}
+
 export function VerifyStep({ session, work, design, runs, tune }: StepProps) {
   const robot_id = session.store.selected_id.value ?? '';
   const own = (runs.answer?.runs ?? []).filter(
@@ -43,8 +60,7 @@ export function VerifyStep({ session, work, design, runs, tune }: StepProps) {
   const found = metrics.answer?.id === design.verified ? (metrics.answer?.found ?? null) : null;
   const run = own.find(({ run_id }) => run_id === design.verified);
   const tuned = work.tuning.answer_to(tune?.key)?.result ?? null;
-  const checksum = session.store.selected.value?.state.value.controller_checksum;
-  const is_other = run !== undefined && run.robot_id === robot_id && run.controller_checksum !== checksum;
+  const made_with = run && controller_note(run.controller_checksum, design.controller, work.pushed.value);
   return (
     <Step
       work={work}
@@ -75,9 +91,9 @@ export function VerifyStep({ session, work, design, runs, tune }: StepProps) {
             value={String(design.verified ?? '')}
             on_choose={(value) => change_design({ ...design, verified: value === '' ? null : Number(value) })}
           />
-          {is_other && (
-            <p class="design-caution design-note">
-              Run {run.run_id} was made with another controller than {robot_id} runs now.
+          {made_with && (
+            <p class={`design-note ${made_with.is_other ? 'design-caution' : 'quiet'}`} id="design-made-with">
+              {made_with.text}
             </p>
           )}
         </div>

@@ -84,8 +84,8 @@ export function Begin({ session, route }: ViewProps) {
         profile: plan.profile,
         duration_s: plan.duration_s,
         me: store.actor.value,
-        now_us: Date.now() * 1000,
-        reservations: around.reservations.filter((each) => each.robot_id === robot.robot_id),
+        now_us: session.utc_us(),
+        reservations: around.reservations?.filter((each) => each.robot_id === robot.robot_id) ?? null,
         at_work,
         queue,
         priority: options.value.priority,
@@ -253,7 +253,8 @@ function useSurroundings(session: ViewProps['session'], robot: Robot | null) {
   return {
     controller: controller.answer?.id === id ? controller.answer.answer : null,
     fluids: fluids.answer,
-    newest_run: newest_run.answer?.id === id ? newest_run.answer.answer : null,
-    reservations: reservations.answer ?? [],
+    // What could not be asked again is not known.
+    newest_run: newest_run.answer?.id === id && newest_run.problem === '' ? newest_run.answer.answer : undefined,
+    reservations: reservations.problem === '' ? reservations.answer : null,
   };
 }

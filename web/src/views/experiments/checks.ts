@@ -9,7 +9,7 @@ import { who } from './words';
 
 export interface Check {
   key: 'connected' | 'rest' | 'control' | 'reservation' | 'queue' | 'fluid' | 'pump';
-  state: 'ok' | 'waits' | 'unknown'; // unknown: nothing is known of it, and the station asks nobody
+  state: 'ok' | 'waits' | 'unknown'; // unknown: nothing is known of it, or not yet
   text: string;
   todo: string;
 }
@@ -20,11 +20,11 @@ export interface Outlook {
   duration_s: number; // of all runs
   me: string; // this page, as an actor
   now_us: number; // UTC
-  reservations: readonly Reservation[]; // of this robot, not over
+  reservations: readonly Reservation[] | null; // of this robot, not over; null: not known
   at_work: ExperimentSummary | undefined;
   queue: readonly ExperimentSummary[];
   priority: number;
-  newest_run: RunRecord | null;
+  newest_run: RunRecord | null | undefined; // null: it has none; undefined: not known
 }
 
 const kRestBefore_us = 5_000_000; // the robot is at rest when the slot of somebody else begins
@@ -45,10 +45,13 @@ function connected({ robot }: Outlook): Check {
 }
 
 function at_rest({ robot }: Outlook): Check {
-  const duty = robot.sample?.duty ?? 0;
+  const duty = robot.sample?.duty;
   if (robot.link !== 'connected') return check('rest', 'unknown', 'Whether the robot is at rest is not known.');
   if (robot.mode === 'emergency' || robot.emergency_id !== null) {
     return check('rest', 'waits', 'The robot is in emergency.', 'Look at the robot, then clear the latch.');
+  }
+  if (robot.mode === 'manual' && duty === undefined) {
+    return check('rest', 'unknown', 'Whether the robot is at rest is not known: no sample of it has come yet.');
   }
   if (robot.mode === 'manual' && duty === 0) return check('rest', 'ok', 'The robot is at rest.');
   const todo = robot.mode === 'manual' ? 'End the duty on the robot’s page.' : 'Set it to manual on the robot’s page.';
@@ -63,6 +66,7 @@ function control({ robot, me }: Outlook): Check {
 }
 
 function reservation({ reservations, me, now_us, duration_s }: Outlook): Check {
+  if (reservations === null) return check('reservation', 'unknown', 'Whether it is reserved is not known yet.');
   const mine = account_of(me);
   const ends_us = now_us + duration_s * 1e6 + kRestBefore_us;
   const others = reservations.filter((each) => each.holder !== mine && each.cancelled_at_us === null);
@@ -105,6 +109,7 @@ function fluid({ robot }: Outlook, { fluid: of_all, fluids }: Profile): Check {
 
 // The newest run that states a flow says what the pump drives; without one it counts as off.
 function pump({ newest_run }: Outlook, profile: Profile): Check {
+  if (newest_run === undefined) return check('pump', 'unknown', 'What the pump drives is not known yet.');
   const now = newest_run?.pump_profile ?? '';
   const is_off = now === '' || now === 'off';
   const is_same = profile.pump === now && (newest_run?.mean_flow_m_s ?? 0) === profile.mean_flow_m_s;

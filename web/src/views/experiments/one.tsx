@@ -164,7 +164,7 @@ function Figure({ name, children }: { name: string; children: preact.ComponentCh
 
 function WaitsSince({ session, experiment }: { session: Session; experiment: ExperimentSummary }) {
   void session.store.now_ms.value;
-  const waited_s = Math.floor((Date.now() * 1000 - experiment.created_at_us) / 1e6);
+  const waited_s = Math.floor((session.utc_us() - experiment.created_at_us) / 1e6);
   return <span class="quiet"> Waits for {how_long(Math.max(0, waited_s))}.</span>;
 }
 
@@ -178,17 +178,21 @@ interface RunPlotProps {
 function RunPlot({ session, experiment, summary }: RunPlotProps) {
   const run = experiment.runs.filter((each) => each.has_prediction).at(-1) ?? null;
   const number = run?.number ?? 0;
-  const prediction = useAsked<Prediction | null>(
+  const id = `${experiment.experiment_id}-${number}`;
+  const asked = useAsked<{ id: string; prediction: Prediction | null }>(
     session,
-    () => (number === 0 ? Promise.resolve(null) : session.experiments.prediction(experiment.experiment_id, number)),
-    [experiment.experiment_id, number],
+    async () => ({
+      id,
+      prediction: number === 0 ? null : await session.experiments.prediction(experiment.experiment_id, number),
+    }),
+    [id],
   );
+  const answer = asked.answer?.id === id ? asked.answer.prediction : null; // not that of the run before
   const is_now = run !== null && summary.progress?.run === number && run.ended_at_us === null;
   const elapsed_s = is_now ? (summary.progress?.elapsed_s ?? null) : null;
   const measured = useMeasured(session.store.find(summary.robot_id), elapsed_s);
-  const track = useMemo(() => track_of_prediction(prediction.answer), [prediction.answer]);
+  const track = useMemo(() => track_of_prediction(answer), [answer]);
   if (!run) return null;
-  const { answer } = prediction;
   if (answer?.error)
     return (
       <p class="quiet">

@@ -47,7 +47,7 @@ export function Reservations({ session }: ViewProps) {
           reservations={reservations}
           robots={store.robots.value.map((each) => each.robot_id)}
           account={account}
-          now_ms={Date.now()}
+          now_ms={session.utc_us() / 1000}
         />
       </section>
       <section aria-label="Reservations" id="reservations">
@@ -116,7 +116,7 @@ function ReserveForm({ session, is_admin, on_made }: ReserveFormProps) {
     wrong.value = '';
   };
   const reserve = () => {
-    const found = parse_slot(slot.value, Date.now());
+    const found = parse_slot(slot.value, session.utc_us() / 1000);
     if ('problem' in found) {
       wrong.value = found.problem;
       return;

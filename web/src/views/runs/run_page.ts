@@ -15,6 +15,7 @@ export class RunPage {
   readonly metrics_problem = signal('');
   readonly markers = signal<Marker[]>([]);
   readonly events = signal<EventRecord[]>([]);
+  readonly are_events_whole = signal(true); // false: older ones than these are left out
   readonly unread = signal(''); // why it is not known what happened in it
   readonly whole = signal<Overview | null>(null);
   readonly traces = signal<Traces | null>(null); // of the window that is looked at
@@ -92,7 +93,10 @@ export class RunPage {
     const run = this.run.peek() as Run;
     const asked = await Promise.allSettled([
       this.api.markers(this.run_id).then((markers) => (this.markers.value = markers)),
-      this.api.events(run).then((events) => (this.events.value = events)),
+      this.api.events(run).then(({ events, is_whole }) => {
+        this.events.value = events;
+        this.are_events_whole.value = is_whole;
+      }),
     ]);
     const failed = asked.find((each) => each.status === 'rejected');
     this.unread.value = failed ? said(failed.reason) : '';

@@ -39,6 +39,7 @@ export interface Window {
 
 export const kMostComparedTraces = 12;
 const kMostGapPages = 10;
+const kMostEventPages = 10;
 
 // A query of what is not empty.
 export function query(members: Record<string, string | number | null | undefined>): string {
@@ -89,10 +90,18 @@ export class RunsApi {
     }
     return found;
   };
-  // In the time of the run; of more than 1000 the newest.
-  events = async (run: Run) => {
-    const path = `/robots/${encodeURIComponent(run.robot_id)}/events?${query({ ...time_of(run), limit: 1000 })}`;
-    return (await this.api.read<{ events: EventRecord[] }>(path)).events;
+  // In the time of the run; of very many the newest.
+  events = async (run: Run): Promise<{ events: EventRecord[]; is_whole: boolean }> => {
+    const events: EventRecord[] = [];
+    for (let before: string | null = null, pages = 0; pages < kMostEventPages; ++pages) {
+      const asked = query({ ...time_of(run), before, limit: 1000 });
+      const path: string = `/robots/${encodeURIComponent(run.robot_id)}/events?${asked}`;
+      const page: Schemas['EventList'] = await this.api.read<Schemas['EventList']>(path);
+      events.push(...page.events);
+      if (page.next === null) return { events, is_whole: true };
+      before = page.next;
+    }
+    return { events, is_whole: false };
   };
   overview = (run_id: number, window: Window | null, points: number, signal?: AbortSignal) =>
     this.api.read<Overview>(`/runs/${run_id}/overview?${query({ ...window, points })}`, signal);

@@ -126,6 +126,11 @@ export function Moments({ page, is_clock, on_show }: MomentsProps) {
           Not all of them could be read: {page.unread.value} It is tried again every 5 s.
         </p>
       )}
+      {!page.are_events_whole.value && (
+        <p class="quiet" id="events-left-out">
+          There are more than {page.events.value.length} events: the newest are shown here. An export has all of them.
+        </p>
+      )}
       {moments.length === 0 && !page.unread.value && <p class="quiet">None.</p>}
       <ol class="moments">
         {moments.map((moment) => (

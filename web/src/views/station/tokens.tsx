@@ -72,7 +72,7 @@ interface TableProps {
 
 function TokenTable({ tokens, context, is_off, on_revoke }: TableProps) {
   const { is_utc } = context;
-  const now_us = Date.now() * 1000;
+  const now_us = context.session.utc_us();
   return (
     <table class="station-table">
       <thead>
