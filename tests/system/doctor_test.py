@@ -300,19 +300,29 @@ class DoctorTest(unittest.TestCase):
                 database.commit()
             self.expect_note(place, "firmware", "0.0.7 (sim-2)")
 
+    def refuse(self, place, cause, detail="for a reason"):
+        with contextlib.closing(sqlite3.connect(place.data / "station.sqlite")) as database:
+            columns = [row[1] for row in database.execute("PRAGMA table_info(event)")]
+            row = dict(zip(columns, database.execute("SELECT * FROM event LIMIT 1").fetchone()))
+            row.update(event_row=None, boot_key=None, event_seq=None, kind="connection_refused", cause=cause,
+                       detail=detail, received_at_us=int(time.time() * 1e6))
+            marks = ",".join("?" * len(columns))
+            database.execute(f"INSERT INTO event VALUES ({marks})", [row[column] for column in columns])
+            database.commit()
+
     def test_a_robot_that_was_refused(self):
         with self.stopped(robot=True) as place:
-            with contextlib.closing(sqlite3.connect(place.data / "station.sqlite")) as database:
-                columns = [row[1] for row in database.execute("PRAGMA table_info(event)")]
-                row = dict(zip(columns, database.execute("SELECT * FROM event LIMIT 1").fetchone()))
-                row.update(event_row=None, boot_key=None, event_seq=None, kind="connection_refused", cause="version",
-                           detail="it speaks version 0", received_at_us=int(time.time() * 1e6))
-                marks = ",".join("?" * len(columns))
-                database.execute(f"INSERT INTO event VALUES ({marks})", [row[column] for column in columns])
-                database.commit()
+            self.refuse(place, "version", "it speaks version 0")
+            self.refuse(place, "wrong_token")
             code, findings = doctor(place)
             self.expect(findings, "robots", "problem", "version: it speaks version 0")
-            self.assertIn("flash the robot", [f for f in findings["robots"] if f["grade"] == "problem"][0]["action"])
+            version, token = sorted((f for f in findings["robots"] if f["grade"] == "problem"),
+                                    key=lambda f: "wrong_token" in f["what"])
+            self.assertIn("flash the robot", version["action"])
+            remedy = token["action"]
+            self.assertLess(remedy.index("back into the robot"), remedy.index("robot revoke"), remedy)
+            self.assertLess(remedy.index("robot revoke"), remedy.index("robot enrol"), remedy)
+            self.assertIn("gives up the samples", remedy)
             self.assertEqual(code, 1)
 
     def test_too_few_open_files(self):

@@ -95,8 +95,12 @@ std::int64_t check_pages(SQLite::Database& database, const fs::path& path, Findi
 // What stands against each cause of a refusal of the robot's Hello.
 const char* remedy_of(const std::string& cause) {
   if (cause == "version") return "flash the robot with the firmware that belongs to this station (docs/robot.md)";
-  if (cause == "wrong_token" || cause == "unknown_robot")
-    return "rheonaut robot enrol ID, and its token into the robot";
+  if (cause == "unknown_robot") return "rheonaut robot enrol ID, and its token into the robot";
+  if (cause == "wrong_token") {
+    return "put the token with which it was enrolled back into the robot; only where nobody has it any more: rheonaut "
+           "robot revoke ID, which gives up the samples that the robot has not sent yet, then rheonaut robot enrol ID, "
+           "and the new token into the robot";
+  }
   if (cause == "already_connected") return "two robots have one name: give each its own";
   return "the robot's events say more: GET /api/v1/robots/ID/events";
 }
