@@ -325,6 +325,25 @@ class DoctorTest(unittest.TestCase):
             self.assertIn("gives up the samples", remedy)
             self.assertEqual(code, 1)
 
+    def test_one_refusal_as_already_connected_is_that_of_a_reset(self):
+        with self.stopped(robot=True) as place:
+            self.refuse(place, "already_connected")
+            self.expect_note(place, "robots", "was refused once in the last day, already_connected")
+            self.refuse(place, "already_connected")
+            self.expect_problem(place, "robots", "was refused 2 times in the last day, already_connected")
+
+    def test_a_database_that_another_program_holds_is_not_called_damaged(self):
+        with self.stopped() as place, contextlib.closing(sqlite3.connect(place.data / "station.sqlite")) as other:
+            other.execute("PRAGMA locking_mode = EXCLUSIVE")
+            other.execute("BEGIN IMMEDIATE")
+            other.execute("UPDATE meta SET value = value")
+            other.commit()
+            code, findings = doctor(place)
+            found = [finding for finding in findings["database"] if finding["grade"] == "problem"]
+            self.assertEqual(["end the program"], [finding["action"][:15] for finding in found], found)
+            self.assertNotIn("damage", found[0]["what"] + found[0]["action"])
+            self.assertEqual(code, 1)
+
     def test_too_few_open_files(self):
         def few():
             resource.setrlimit(resource.RLIMIT_NOFILE, (500, 500))
