@@ -2,6 +2,7 @@
 import pathlib
 import sqlite3
 import subprocess
+import time
 import unittest
 
 from processes import BIN, lab, wait_until
@@ -78,6 +79,18 @@ class BackupTest(unittest.TestCase):
             self.assertIn("is there already", error)
             self.assertIn("there is no", tool("backup", "--data", place.folder / "none", "--to", copy)[2])
             self.assertFalse(pathlib.Path(place.folder / "none").exists())
+
+    def test_copies_for_commands_that_ended_early_are_removed_after_a_day(self):
+        with lab() as place:
+            place.start_station()
+            folder = place.data / "backups"
+            folder.mkdir(exist_ok=True)
+            recent = f"cli-{int(time.time()) - 3600}-17.sqlite"
+            others = {recent, "cli-monday.sqlite", "monday.sqlite"}
+            for name in others | {"cli-1600000000-17.sqlite"}:
+                (folder / name).write_text("a copy")
+            self.assertEqual(tool("backup", "--data", place.data, "--to", place.folder / "copy.sqlite")[0], 0)
+            self.assertEqual({path.name for path in folder.iterdir()}, others)
 
     def test_a_damaged_backup_is_refused(self):
         with lab() as place:
