@@ -211,24 +211,40 @@ class DoctorTest(unittest.TestCase):
             self.expect_problem(place, "certificate", "is not there, and a port speaks TLS", "--config", config)
             place.tool("certificate", "--data", place.data)
             self.assertEqual(doctor(place, "--config", config)[0], 0)
-            named = self.write_config(place, "[tls]\nmode = \"on\"\n[http]\nhosts = [\"lab.example\"]\n")
-            self.expect_problem(place, "certificate", "not for lab.example", "--config", named)
             tls = place.data / "tls"
             shutil.copy(tls / "station.key", place.folder / "right.key")
             shutil.copy(tls / "lab-ca.key", tls / "station.key")
-            self.expect_problem(place, "certificate", "is not the key of")
+            self.expect_problem(place, "certificate", "is not the key of", "--config", config)
             shutil.copy(place.folder / "right.key", tls / "station.key")
             self.replace_certificate(place, 12)
-            self.expect_problem(place, "certificate", "it expires in 11 days")
+            self.expect_problem(place, "certificate", "it expires in 11 days", "--config", config)
             self.age_certificate(tls / "station.crt")
-            self.expect_problem(place, "certificate", "it has expired")
+            self.expect_problem(place, "certificate", "it has expired", "--config", config)
+            self.expect_note(place, "certificate", "it has expired")  # no port of it speaks TLS
             (tls / "station.crt").write_text("no certificate")
-            self.expect_problem(place, "certificate", "station.crt")
+            self.expect_problem(place, "certificate", "station.crt", "--config", config)
 
-    def replace_certificate(self, place, days):
+    def test_a_certificate_that_is_not_for_every_name(self):
+        def named(listen, name):
+            return self.write_config(place, f'[tls]\nmode = "on"\n[http]\nlisten = "{listen}:0"\nhosts = ["{name}"]\n')
+
+        with self.stopped() as place:
+            place.tool("certificate", "--data", place.data)
+            _, findings = doctor(place, "--config", named("0.0.0.0", "page.lab.example"))
+            self.expect(findings, "certificate", "problem", "not for page.lab.example")
+            # On loopback only a proxy can answer to that name.
+            config = named("127.0.0.1", "page.lab.example")
+            self.expect_note(place, "certificate", "not for page.lab.example", "--config", config)
+            self.replace_certificate(place, 90, "DNS:localhost,DNS:*.Lab.example")
+            for name, is_covered in (("page.lab.example", True), ("lab.example", False), ("a.page.lab.example", False)):
+                _, findings = doctor(place, "--config", named("0.0.0.0", name))
+                found = [one for one in findings["certificate"] if "not for" in one["what"]]
+                self.assertEqual([], found) if is_covered else self.assertEqual(1, len(found), name)
+
+    def replace_certificate(self, place, days, names="DNS:localhost"):
         tls = place.data / "tls"
         subprocess.run(["openssl", "req", "-x509", "-key", tls / "station.key", "-days", str(days), "-subj", "/CN=lab",
-                        "-addext", "subjectAltName=DNS:localhost", "-out", tls / "station.crt"], check=True,
+                        "-addext", f"subjectAltName={names}", "-out", tls / "station.crt"], check=True,
                        capture_output=True)
 
     def age_certificate(self, path):
