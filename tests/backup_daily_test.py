@@ -16,16 +16,24 @@ class BackupDailyTest(unittest.TestCase):
         self.data = pathlib.Path(folder.name)
         self.copies = self.data / "daily"
         self.copies.mkdir()
+        (self.data / "station.sqlite").touch()
+        self.checked = (f'{{\n  "valid": true,\n  "data": "{self.data}",\n'
+                        '  "http": {"listen":"127.0.0.1:8080"},\n  "robots": {"data": "not this"}\n}')
 
     def names(self):
         return sorted(path.name for path in self.copies.iterdir())
 
     def back_up(self, program='for name; do :; done; echo new > "$name"', **settings):
-        """`program` finds the name of the copy as its last argument."""
+        """`program` finds the name of the copy as its last argument; before it check-config names the data folder."""
+        (self.data / "checked.json").write_text(self.checked)
         rheonaut = self.data / "rheonaut"
-        rheonaut.write_text(f"#!/bin/sh\n{program}\n")
+        rheonaut.write_text(f"""#!/bin/sh
+echo "$@" >> '{self.data}/calls'
+if [ "$1" = check-config ]; then cat '{self.data}/checked.json'; exit; fi
+{program}
+""")
         rheonaut.chmod(0o755)
-        return subprocess.run([SCRIPT], env={**os.environ, "RHEONAUT_DATA": str(self.data),
+        return subprocess.run([SCRIPT], env={**os.environ, "RHEONAUT_CONFIG": "lab.toml",
                                              "RHEONAUT_PROGRAM": str(rheonaut), **settings}, capture_output=True, text=True)
 
     def fill(self, *names):
@@ -40,6 +48,24 @@ class BackupDailyTest(unittest.TestCase):
         self.assertEqual("new\n", (self.copies / new.pop()).read_text())
         self.assertEqual(3, len(self.names()))
         self.assertNotIn(AHEAD[0], self.names())
+
+    def test_the_folder_is_that_of_the_configuration(self):
+        self.assertEqual(0, self.back_up().returncode)
+        asked, made = (self.data / "calls").read_text().splitlines()
+        self.assertEqual("check-config --config lab.toml --json", asked)
+        self.assertTrue(made.startswith(f"backup --data {self.data} --to {self.copies}/daily-2"), made)
+
+    def test_before_the_first_start_there_is_nothing_to_copy(self):
+        (self.data / "station.sqlite").unlink()
+        done = self.back_up()
+        self.assertEqual((0, [], ""), (done.returncode, self.names(), done.stderr))
+        self.assertIn("no backup is made", done.stdout)
+
+    def test_a_configuration_without_a_folder_is_an_error(self):
+        self.checked = "{}"
+        done = self.back_up()
+        self.assertEqual((1, []), (done.returncode, self.names()))
+        self.assertIn("names no data folder", done.stderr)
 
     def test_one_copy_is_the_new_one(self):
         self.fill(*AHEAD)

@@ -9,6 +9,7 @@
 #include <unistd.h>
 
 #include <cstring>
+#include <fstream>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
@@ -24,19 +25,42 @@ constexpr std::chrono::seconds kAnnounceInterval{2};
 FolderLock take_lock(const std::filesystem::path& folder) {
   make_data_folder(folder);
   if (auto lock = FolderLock::try_take(folder)) return std::move(*lock);
-  throw std::runtime_error{fmt::format(
-      "another station runs in '{}'; stop it, or give this one a folder of its own with --data", folder.string())};
+  throw std::runtime_error{fmt::format("{} uses '{}'; stop it, or choose another folder with --data",
+                                       FolderLock::holder(folder), folder.string())};
 }
+
+// "rheonaut backup": the program's name and its first argument, if that is no option.
+std::string own_command() {
+  std::ifstream in{"/proc/self/cmdline", std::ios::binary};
+  std::string program, command;
+  std::getline(in, program, '\0');
+  std::getline(in, command, '\0');
+  program = std::filesystem::path{program}.filename().string();
+  return command.empty() || command.front() == '-' ? program : program + ' ' + command;
+}
+
+std::filesystem::path lock_file(const std::filesystem::path& folder) { return folder / "rheonaut.lock"; }
 
 }  // namespace
 
 std::optional<FolderLock> FolderLock::try_take(const std::filesystem::path& folder) {
-  const auto path = folder / "rheonaut.lock";
+  const auto path = lock_file(folder);
   const int file = open(path.c_str(), O_RDWR | O_CREAT | O_NOFOLLOW | O_CLOEXEC, 0600);
   if (file < 0) throw std::runtime_error{fmt::format("cannot open '{}': {}", path.string(), std::strerror(errno))};
-  if (flock(file, LOCK_EX | LOCK_NB) == 0) return FolderLock{file};
-  close(file);
-  return std::nullopt;
+  if (flock(file, LOCK_EX | LOCK_NB) != 0) {
+    close(file);
+    return std::nullopt;
+  }
+  const std::string holder = fmt::format("{} (pid {})\n", own_command(), getpid());
+  // On a full disk the file stays empty: the lock holds all the same.
+  if (ftruncate(file, 0) != 0 || write(file, holder.data(), holder.size()) < 0) spdlog::debug("the lock has no name");
+  return FolderLock{file};
+}
+
+std::string FolderLock::holder(const std::filesystem::path& folder) {
+  std::ifstream in{lock_file(folder)};
+  std::string line;
+  return std::getline(in, line) && !line.empty() ? line : "another program";
 }
 
 FolderLock::~FolderLock() {

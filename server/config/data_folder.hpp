@@ -7,7 +7,7 @@
 //                                    "tls_certificate", the file to trust, when http is https, and
 //                                    "robots_tls_certificate" when robots dial with TLS
 //   tls/                             made by `rheonaut certificate`
-//   rheonaut.lock                    locked while it runs
+//   rheonaut.lock                    locked while it runs, or a command works on the files; says which one
 //   rheonaut.reserve                 1 MB of room for a start on a full disk
 #pragma once
 
@@ -25,7 +25,10 @@ namespace server::config {
 class FolderLock {
  public:
   // None when another program holds it. The folder is there. Throws std::runtime_error when it cannot be asked.
+  // Its command line, as "rheonaut backup", and its process id are then in the file.
   static std::optional<FolderLock> try_take(const std::filesystem::path& folder);
+  // "rheonaut backup (pid 123)", which holds it; "another program" where the file does not say.
+  static std::string holder(const std::filesystem::path& folder);
   FolderLock(FolderLock&& other) noexcept : file_{std::exchange(other.file_, -1)} {}
   FolderLock& operator=(FolderLock&&) = delete;
   ~FolderLock();

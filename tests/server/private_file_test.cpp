@@ -108,6 +108,21 @@ TEST_F(PrivateFile, AFolderThatItsGroupMayWriteIsUsedWithAWarning) {
   EXPECT_NE(log.text().find("chmod g-w"), std::string::npos) << log.text();
 }
 
+TEST_F(PrivateFile, TheLockOfAFolderSaysWhichProgramHoldsIt) {
+  std::ofstream{folder / "rheonaut.lock"} << "rheonaut of an earlier and longer command line (pid 1)\n";
+  {
+    const auto lock = config::FolderLock::try_take(folder);
+    ASSERT_TRUE(lock);
+    EXPECT_FALSE(config::FolderLock::try_take(folder));
+    const std::string holder = config::FolderLock::holder(folder);
+    EXPECT_EQ(holder.find("server_config_test"), 0U) << holder;
+    EXPECT_TRUE(holder.ends_with(" (pid " + std::to_string(::getpid()) + ")")) << holder;
+    const std::string said = refusal([&] { config::DataFolder{folder}; });
+    EXPECT_EQ(said.find(holder + " uses '" + folder.string() + "'; stop it"), 0U) << said;
+  }
+  EXPECT_TRUE(config::FolderLock::try_take(folder));
+}
+
 // A link under the name of the draft, or of the file, leads nowhere.
 TEST_F(PrivateFile, LinksThatArePlantedBesideTheDatabaseAreNotFollowed) {
   const fs::path elsewhere = folder / "elsewhere";

@@ -1,7 +1,9 @@
 """A live station is backed up, the backup restored, and the robot goes on with the restored station."""
+import fcntl
 import pathlib
 import sqlite3
 import subprocess
+import time
 import unittest
 
 from processes import BIN, lab, wait_until
@@ -46,7 +48,7 @@ class BackupTest(unittest.TestCase):
 
             status, _, error = tool("restore", "--from", copy, "--data", place.data)
             self.assertEqual(status, 1)
-            self.assertIn("a station runs in", error)
+            self.assertIn(f"rheonaut serve (pid {place.station_process.pid}) uses '{place.data}'; stop it first", error)
             ports = station.endpoints
             before = station.get("/api/v1/station")["store_id"]
             self.assertEqual(place.stop_station(), 0)
@@ -64,6 +66,19 @@ class BackupTest(unittest.TestCase):
             wait_until(lambda: restored.robot("sim-1")["durable_next_seq"] > seen + 50, 30, "the robot goes on")
             self.assertEqual(restored.get("/api/v1/recording")["state"], "recording")
 
+    def test_a_command_names_the_program_that_holds_the_folder(self):
+        with lab() as place:
+            place.start_station()
+            place.stop_station()
+            (place.data / "rheonaut.lock").write_text("rheonaut backup (pid 4711)\n")
+            with open(place.data / "rheonaut.lock") as lock:
+                fcntl.flock(lock, fcntl.LOCK_EX)
+                for words in (["serve", "--http", "127.0.0.1:0", "--robots", "127.0.0.1:0"], ["user", "list"]):
+                    status, _, error = tool(*words, "--data", place.data)
+                    self.assertEqual(status, 1)
+                    self.assertIn(f"rheonaut backup (pid 4711) uses '{place.data}'", error)
+            self.assertEqual(tool("user", "list", "--data", place.data)[0], 0)
+
     def test_without_a_station_it_copies_by_itself(self):
         with lab() as place:
             station = place.start_station()
@@ -78,6 +93,18 @@ class BackupTest(unittest.TestCase):
             self.assertIn("is there already", error)
             self.assertIn("there is no", tool("backup", "--data", place.folder / "none", "--to", copy)[2])
             self.assertFalse(pathlib.Path(place.folder / "none").exists())
+
+    def test_copies_for_commands_that_ended_early_are_removed_after_a_day(self):
+        with lab() as place:
+            place.start_station()
+            folder = place.data / "backups"
+            folder.mkdir(exist_ok=True)
+            recent = f"cli-{int(time.time()) - 3600}-17.sqlite"
+            others = {recent, "cli-monday.sqlite", "monday.sqlite"}
+            for name in others | {"cli-1600000000-17.sqlite"}:
+                (folder / name).write_text("a copy")
+            self.assertEqual(tool("backup", "--data", place.data, "--to", place.folder / "copy.sqlite")[0], 0)
+            self.assertEqual({path.name for path in folder.iterdir()}, others)
 
     def test_a_damaged_backup_is_refused(self):
         with lab() as place:

@@ -105,8 +105,8 @@ class DemoTest(unittest.TestCase):
         second = subprocess.run([str(BIN / "rheonaut"), "demo", "--data", str(self.data), "--once"], capture_output=True,
                                 text=True, timeout=60)
         self.assertEqual(1, second.returncode)
-        self.assertIn("another station runs in", second.stderr)
-        self.assertTrue(json.loads((self.data / "endpoints.json").read_text())["http"])
+        station = json.loads((self.data / "endpoints.json").read_text())
+        self.assertIn(f"rheonaut serve (pid {station['pid']}) uses '{self.data}'; stop it", second.stderr)
 
 
 if __name__ == "__main__":

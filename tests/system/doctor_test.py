@@ -212,24 +212,40 @@ class DoctorTest(unittest.TestCase):
             self.expect_problem(place, "certificate", "is not there, and a port speaks TLS", "--config", config)
             place.tool("certificate", "--data", place.data)
             self.assertEqual(doctor(place, "--config", config)[0], 0)
-            named = self.write_config(place, "[tls]\nmode = \"on\"\n[http]\nhosts = [\"lab.example\"]\n")
-            self.expect_problem(place, "certificate", "not for lab.example", "--config", named)
             tls = place.data / "tls"
             shutil.copy(tls / "station.key", place.folder / "right.key")
             shutil.copy(tls / "lab-ca.key", tls / "station.key")
-            self.expect_problem(place, "certificate", "is not the key of")
+            self.expect_problem(place, "certificate", "is not the key of", "--config", config)
             shutil.copy(place.folder / "right.key", tls / "station.key")
             self.replace_certificate(place, 12)
-            self.expect_problem(place, "certificate", "it expires in 11 days")
+            self.expect_problem(place, "certificate", "it expires in 11 days", "--config", config)
             self.age_certificate(tls / "station.crt")
-            self.expect_problem(place, "certificate", "it has expired")
+            self.expect_problem(place, "certificate", "it has expired", "--config", config)
+            self.expect_note(place, "certificate", "it has expired")  # no port of it speaks TLS
             (tls / "station.crt").write_text("no certificate")
-            self.expect_problem(place, "certificate", "station.crt")
+            self.expect_problem(place, "certificate", "station.crt", "--config", config)
 
-    def replace_certificate(self, place, days):
+    def test_a_certificate_that_is_not_for_every_name(self):
+        def named(listen, name):
+            return self.write_config(place, f'[tls]\nmode = "on"\n[http]\nlisten = "{listen}:0"\nhosts = ["{name}"]\n')
+
+        with self.stopped() as place:
+            place.tool("certificate", "--data", place.data)
+            _, findings = doctor(place, "--config", named("0.0.0.0", "page.lab.example"))
+            self.expect(findings, "certificate", "problem", "not for page.lab.example")
+            # On loopback only a proxy can answer to that name.
+            config = named("127.0.0.1", "page.lab.example")
+            self.expect_note(place, "certificate", "not for page.lab.example", "--config", config)
+            self.replace_certificate(place, 90, "DNS:localhost,DNS:*.Lab.example")
+            for name, is_covered in (("page.lab.example", True), ("lab.example", False), ("a.page.lab.example", False)):
+                _, findings = doctor(place, "--config", named("0.0.0.0", name))
+                found = [one for one in findings["certificate"] if "not for" in one["what"]]
+                self.assertEqual([], found) if is_covered else self.assertEqual(1, len(found), name)
+
+    def replace_certificate(self, place, days, names="DNS:localhost"):
         tls = place.data / "tls"
         subprocess.run(["openssl", "req", "-x509", "-key", tls / "station.key", "-days", str(days), "-subj", "/CN=lab",
-                        "-addext", "subjectAltName=DNS:localhost", "-out", tls / "station.crt"], check=True,
+                        "-addext", f"subjectAltName={names}", "-out", tls / "station.crt"], check=True,
                        capture_output=True)
 
     def age_certificate(self, path):
@@ -301,19 +317,48 @@ class DoctorTest(unittest.TestCase):
                 database.commit()
             self.expect_note(place, "firmware", "0.0.7 (sim-2)")
 
+    def refuse(self, place, cause, detail="for a reason"):
+        with contextlib.closing(sqlite3.connect(place.data / "station.sqlite")) as database:
+            columns = [row[1] for row in database.execute("PRAGMA table_info(event)")]
+            row = dict(zip(columns, database.execute("SELECT * FROM event LIMIT 1").fetchone()))
+            row.update(event_row=None, boot_key=None, event_seq=None, kind="connection_refused", cause=cause,
+                       detail=detail, received_at_us=int(time.time() * 1e6))
+            marks = ",".join("?" * len(columns))
+            database.execute(f"INSERT INTO event VALUES ({marks})", [row[column] for column in columns])
+            database.commit()
+
     def test_a_robot_that_was_refused(self):
         with self.stopped(robot=True) as place:
-            with contextlib.closing(sqlite3.connect(place.data / "station.sqlite")) as database:
-                columns = [row[1] for row in database.execute("PRAGMA table_info(event)")]
-                row = dict(zip(columns, database.execute("SELECT * FROM event LIMIT 1").fetchone()))
-                row.update(event_row=None, boot_key=None, event_seq=None, kind="connection_refused", cause="version",
-                           detail="it speaks version 0", received_at_us=int(time.time() * 1e6))
-                marks = ",".join("?" * len(columns))
-                database.execute(f"INSERT INTO event VALUES ({marks})", [row[column] for column in columns])
-                database.commit()
+            self.refuse(place, "version", "it speaks version 0")
+            self.refuse(place, "wrong_token")
             code, findings = doctor(place)
             self.expect(findings, "robots", "problem", "version: it speaks version 0")
-            self.assertIn("flash the robot", [f for f in findings["robots"] if f["grade"] == "problem"][0]["action"])
+            version, token = sorted((f for f in findings["robots"] if f["grade"] == "problem"),
+                                    key=lambda f: "wrong_token" in f["what"])
+            self.assertIn("flash the robot", version["action"])
+            remedy = token["action"]
+            self.assertLess(remedy.index("back into the robot"), remedy.index("robot revoke"), remedy)
+            self.assertLess(remedy.index("robot revoke"), remedy.index("robot enrol"), remedy)
+            self.assertIn("gives up the samples", remedy)
+            self.assertEqual(code, 1)
+
+    def test_one_refusal_as_already_connected_is_that_of_a_reset(self):
+        with self.stopped(robot=True) as place:
+            self.refuse(place, "already_connected")
+            self.expect_note(place, "robots", "was refused once in the last day, already_connected")
+            self.refuse(place, "already_connected")
+            self.expect_problem(place, "robots", "was refused 2 times in the last day, already_connected")
+
+    def test_a_database_that_another_program_holds_is_not_called_damaged(self):
+        with self.stopped() as place, contextlib.closing(sqlite3.connect(place.data / "station.sqlite")) as other:
+            other.execute("PRAGMA locking_mode = EXCLUSIVE")
+            other.execute("BEGIN IMMEDIATE")
+            other.execute("UPDATE meta SET value = value")
+            other.commit()
+            code, findings = doctor(place)
+            found = [finding for finding in findings["database"] if finding["grade"] == "problem"]
+            self.assertEqual(["end the program"], [finding["action"][:15] for finding in found], found)
+            self.assertNotIn("damage", found[0]["what"] + found[0]["action"])
             self.assertEqual(code, 1)
 
     def test_too_few_open_files(self):

@@ -6,8 +6,10 @@
 #include <optional>
 #include <stdexcept>
 
+#include "server/config/data_folder.hpp"
 #include "server/config/endpoint.hpp"
 #include "server/runtime/private_file.hpp"
+#include "server/storage/query/run_reader.hpp"
 
 namespace server::cli {
 namespace asio = boost::asio;
@@ -18,8 +20,13 @@ namespace {
 nlohmann::json announcement_in(const std::filesystem::path& file) {
   const std::optional<std::string> text = runtime::read_private(file);
   if (!text) {
+    const std::filesystem::path folder = file.parent_path();
+    if (!storage::lock_is_free(folder / "station.sqlite")) {
+      throw std::runtime_error{fmt::format("{} uses '{}' and cannot be asked yet; wait until it is ready or has ended",
+                                           config::FolderLock::holder(folder), folder.string())};
+    }
     throw std::runtime_error{
-        fmt::format("no station runs in '{0}': rheonaut serve --data '{0}' starts one", file.parent_path().string())};
+        fmt::format("no station runs in '{0}': rheonaut serve --data '{0}' starts one", folder.string())};
   }
   auto content = nlohmann::json::parse(*text, nullptr, false);
   if (!content.is_object() || !content.contains("http")) {

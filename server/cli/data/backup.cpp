@@ -8,6 +8,7 @@
 #include <CLI/CLI.hpp>
 #include <boost/asio/io_context.hpp>
 #include <optional>
+#include <regex>
 #include <stdexcept>
 #include <string>
 
@@ -46,11 +47,28 @@ nlohmann::json look(const StationClient& station, const std::string& name) {
   throw std::runtime_error{fmt::format("the station no longer knows backup '{}'", name)};
 }
 
+// The station's copies for commands that ended before they had moved them: a day old, for stations of several machines
+// may put their copies into one folder.
+void remove_abandoned_copies(const StationClient& station, std::int64_t now_s) {
+  static const std::regex kOfACommand{"cli-([0-9]{1,12})-[0-9]+"};
+  constexpr std::int64_t kDayS = 86'400;
+  const StationAnswer answer = station.ask("GET", "/api/v1/backups");
+  for (const auto& backup : answer.body.value("backups", nlohmann::json::array())) {
+    const auto name = backup.at("name").get<std::string>();
+    std::smatch match;
+    if (backup.at("state") != "done" || !std::regex_match(name, match, kOfACommand)) continue;
+    std::error_code ignored;
+    if (now_s - std::stoll(match[1]) > kDayS) fs::remove(backup.at("path").get<std::string>(), ignored);
+  }
+}
+
 // Where the station has put it.
 fs::path let_station_copy(const StationClient& station) {
   boost::asio::io_context loop;
   runtime::SystemClock clock{loop};
-  const std::string name = fmt::format("cli-{}-{}", clock.utc_us() / 1'000'000, getpid());
+  const std::int64_t now_s = clock.utc_us() / 1'000'000;
+  remove_abandoned_copies(station, now_s);
+  const std::string name = fmt::format("cli-{}-{}", now_s, getpid());
   const StationAnswer begun = station.ask("POST", "/api/v1/backups", {{"name", name}});
   if (begun.status != kAccepted) {
     throw std::runtime_error{fmt::format("the station makes no backup: {}", begun.body.value("detail", "no reason"))};

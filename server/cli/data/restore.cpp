@@ -27,7 +27,8 @@ int run(const Restore& options, std::ostream& out) {
   config::make_data_folder(options.data_dir);
   const auto lock = config::FolderLock::try_take(options.data_dir);
   if (!lock) {
-    throw std::runtime_error{fmt::format("a station runs in '{}'; stop it first", options.data_dir.string())};
+    throw std::runtime_error{fmt::format("{} uses '{}'; stop it first", config::FolderLock::holder(options.data_dir),
+                                         options.data_dir.string())};
   }
   const Progress progress{"restore: the database is copied and verified", options.form};
   const storage::RestoredStore restored =

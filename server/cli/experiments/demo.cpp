@@ -244,8 +244,8 @@ int run(const Demo& options, std::ostream& out) {
   const std::filesystem::path endpoints = data / "endpoints.json", station_log = data / "station.log";
   const std::filesystem::path robot_log = data / "robot.log";
   if (!config::FolderLock::try_take(data)) {
-    throw std::runtime_error{
-        fmt::format("another station runs in '{}'; stop it, or choose another folder with --data", data.string())};
+    throw std::runtime_error{fmt::format("{} uses '{}'; stop it, or choose another folder with --data",
+                                         config::FolderLock::holder(data), data.string())};
   }
   const std::filesystem::path database = data / "station.sqlite";
   const Narrator narrator{options.is_json ? stderr : stdout};

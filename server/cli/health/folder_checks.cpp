@@ -8,6 +8,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <boost/algorithm/string/predicate.hpp>
 #include <optional>
 
 #include "server/config/endpoint.hpp"
@@ -58,8 +59,13 @@ void judge_secret(const fs::path& file, const struct stat& folder, Findings& fin
   }
 }
 
+// "*.lab.example" covers one label more: "page.lab.example".
 bool names_cover(const tls::TlsCertificate& certificate, const std::string& name) {
-  return std::ranges::find(certificate.names, name) != certificate.names.end();
+  const std::size_t dot = name.find('.');
+  const std::string wildcard = dot == std::string::npos ? "" : "*" + name.substr(dot);
+  return std::ranges::any_of(certificate.names, [&](const std::string& covered) {
+    return boost::iequals(covered, name) || (!wildcard.empty() && boost::iequals(covered, wildcard));
+  });
 }
 
 void judge_names(const config::Config& config, const tls::TlsCertificate& certificate, Findings& findings) {
@@ -71,10 +77,13 @@ void judge_names(const config::Config& config, const tls::TlsCertificate& certif
   const bool is_named = address.is_unspecified() || address.is_loopback();
   if (!is_named && !names_cover(certificate, address.to_string())) missing.push_back(address.to_string());
   if (missing.empty()) return;
-  findings.problem("certificate",
-                   fmt::format("it is for {}, and not for {}: browsers that use that name refuse it",
-                               fmt::join(certificate.names, ", "), fmt::join(missing, ", ")),
-                   fmt::format("rheonaut certificate --data '{}' --name …, with every name", config.data_dir.string()));
+  const std::string what = fmt::format("it is for {}, and not for {}: browsers that use that name refuse it",
+                                       fmt::join(certificate.names, ", "), fmt::join(missing, ", "));
+  const std::string renew =
+      fmt::format("rheonaut certificate --data '{}' --name …, with every name", config.data_dir.string());
+  if (!address.is_loopback()) return findings.problem("certificate", what, renew);
+  findings.note("certificate", what,
+                "nothing where a proxy answers to that name with its own certificate; else " + renew);
 }
 
 void judge_expiry(const config::Config& config, const tls::TlsCertificate& certificate, std::int64_t now_us,
@@ -135,18 +144,27 @@ void check_certificate(const config::Config& config, std::int64_t now_us, Findin
     return findings.problem("certificate", fmt::format("{} is not there, and a port speaks TLS", file.string()),
                             fmt::format("rheonaut certificate --data '{}' --name NAME", config.data_dir.string()));
   }
+  Findings of_file;
   try {
     const tls::TlsCertificate certificate = tls::describe(*tls::load_certificate(file));
     if (tls::public_key_pem(*tls::load_key(key_file)) != certificate.public_key_pem) {
-      findings.problem("certificate", fmt::format("{} is not the key of {}", key_file.string(), file.string()),
-                       "put the two files of the same certificate there, or make both anew: rheonaut certificate");
+      of_file.problem("certificate", fmt::format("{} is not the key of {}", key_file.string(), file.string()),
+                      "put the two files of the same certificate there, or make both anew: rheonaut certificate");
     }
-    judge_names(config, certificate, findings);
-    judge_expiry(config, certificate, now_us, findings);
+    if (config.speaks_tls(config.http)) judge_names(config, certificate, of_file);
+    judge_expiry(config, certificate, now_us, of_file);
   } catch (const std::exception& error) {  // the file is named in it
-    findings.problem("certificate", error.what(),
-                     "put a certificate and its key in PEM there, or make both anew: "
-                     "rheonaut certificate");
+    of_file.problem("certificate", error.what(),
+                    "put a certificate and its key in PEM there, or make both anew: "
+                    "rheonaut certificate");
+  }
+  if (is_needed) return findings.append(of_file);
+  for (const Finding& found : of_file.all()) {
+    if (found.grade == Grade::fine) {
+      findings.fine(found.topic, found.what);
+    } else {
+      findings.note(found.topic, found.what + " (no port of this configuration speaks TLS)", found.action);
+    }
   }
 }
 

@@ -24,6 +24,8 @@ namespace {
 constexpr std::int64_t kCheckUs = 5'000'000;
 constexpr int kStepsBetweenLooks = 10'000;  // of SQLite's virtual machine
 constexpr std::int64_t kRefusalsUs = 86'400'000'000;
+constexpr const char* kReadAgain =
+    "end the program that holds it, look at the rights of the file and at the disk, and ask again";
 constexpr const char* kVerify = "stop the station, then rheonaut verify, and restore a backup if it finds damage";
 
 std::int64_t newest_version() { return static_cast<std::int64_t>(storage::migrations().size()); }
@@ -48,7 +50,11 @@ std::optional<std::string> damage_found_in_time(SQLite::Database& database) {
     const std::string said = database.execAndGet("PRAGMA quick_check(1)").getString();
     damage = said == "ok" ? "" : said;
   } catch (const SQLite::Exception& error) {
-    if (error.getErrorCode() != SQLITE_INTERRUPT) damage = error.what();
+    if (storage::means_damage(error)) {
+      damage = error.what();
+    } else if (error.getErrorCode() != SQLITE_INTERRUPT) {
+      throw;
+    }
   }
   sqlite3_progress_handler(database.getHandle(), 0, nullptr, nullptr);
   return damage;
@@ -93,11 +99,20 @@ std::int64_t check_pages(SQLite::Database& database, const fs::path& path, Findi
 }
 
 // What stands against each cause of a refusal of the robot's Hello.
-const char* remedy_of(const std::string& cause) {
+const char* remedy_of(const std::string& cause, int count) {
   if (cause == "version") return "flash the robot with the firmware that belongs to this station (docs/robot.md)";
-  if (cause == "wrong_token" || cause == "unknown_robot")
-    return "rheonaut robot enrol ID, and its token into the robot";
-  if (cause == "already_connected") return "two robots have one name: give each its own";
+  if (cause == "unknown_robot") return "rheonaut robot enrol ID, and its token into the robot";
+  if (cause == "wrong_token") {
+    return "put the token with which it was enrolled back into the robot; only where nobody has it any more: rheonaut "
+           "robot revoke ID, which gives up the samples that the robot has not sent yet, then rheonaut robot enrol ID, "
+           "and the new token into the robot";
+  }
+  if (cause == "already_connected") {
+    return count == 1
+               ? "nothing: a robot that was reset is refused until its old connection has ended. If it comes again "
+                 "without a reset, two robots have one name"
+               : "if the robot was not reset as often, two robots have one name: give each its own";
+  }
   return "the robot's events say more: GET /api/v1/robots/ID/events";
 }
 
@@ -109,11 +124,15 @@ void check_refusals(SQLite::Database& database, std::int64_t now_us, Findings& f
   query.bind(1, now_us - kRefusalsUs);
   while (query.executeStep()) {
     const std::string cause = query.getColumn(1).getString();
-    findings.problem(
-        "robots",
-        fmt::format("robot '{}' was refused {} times in the last day, {}: {}", one_line(query.getColumn(0).getString()),
-                    query.getColumn(2).getInt(), cause, one_line(query.getColumn(3).getString())),
-        remedy_of(cause));
+    const int count = query.getColumn(2).getInt();
+    const std::string what = fmt::format(
+        "robot '{}' was refused {} in the last day, {}: {}", one_line(query.getColumn(0).getString()),
+        count == 1 ? "once" : fmt::format("{} times", count), cause, one_line(query.getColumn(3).getString()));
+    if (cause == "already_connected" && count == 1) {
+      findings.note("robots", what, remedy_of(cause, count));
+    } else {
+      findings.problem("robots", what, remedy_of(cause, count));
+    }
   }
 }
 
@@ -189,7 +208,10 @@ std::int64_t check_database(const fs::path& path, Findings& findings) {
   };
   const auto done = storage::read_store(path, read);
   findings.append(of_pages);
-  if (!done) findings.problem("database", one_line(done.error().detail), kVerify);
+  if (!done) {
+    const bool is_unreadable = done.error().code == ErrorCode::unavailable;  // now; a damaged one is found above
+    findings.problem("database", one_line(done.error().detail), is_unreadable ? kReadAgain : kVerify);
+  }
   return latest_us;
 }
 

@@ -119,6 +119,33 @@ SQLite::Database open_settled(const std::filesystem::path& path) {
   return open_checked(path);
 }
 
+// All of them after this version, in one transaction.
+void run_migrations(SQLite::Database& database, std::size_t version) {
+  SQLite::Transaction transaction{database, SQLite::TransactionBehavior::IMMEDIATE};
+  for (const char* script : migrations().subspan(version)) database.exec(script);
+  if (version == 0) {
+    std::uint64_t store_id = 0;
+    randombytes_buf(&store_id, sizeof store_id);
+    SQLite::Statement add{database, "INSERT INTO meta (name, value) VALUES (?, ?)"};
+    execute(add, "store_id", store_id);
+    execute(add, "next_row", std::int64_t{1});
+  }
+  database.exec(fmt::format("PRAGMA application_id = {}", kApplicationId));
+  database.exec(fmt::format("PRAGMA user_version = {}", migrations().size()));
+  transaction.commit();
+}
+
+[[noreturn]] void refuse_without_room(const std::filesystem::path& path, std::size_t version) {
+  constexpr double kMegabyte = 1e6;
+  const std::filesystem::path folder = std::filesystem::absolute(path).parent_path();
+  throw std::runtime_error{fmt::format(
+      "cannot bring {} from schema {} to the present one: the disk became full. The database has {:.1f} MB: make room "
+      "for "
+      "as much again in {}, or move the folder to a larger disk, and start again; until then the program that wrote it "
+      "works with it as before, for nothing was changed",
+      path.string(), version, static_cast<double>(std::filesystem::file_size(path)) / kMegabyte, folder.string())};
+}
+
 }  // namespace
 
 Database::Database(const std::filesystem::path& path, BeforeMigration before) : handle_{open_settled(path)} {
@@ -136,18 +163,12 @@ void Database::migrate(const std::filesystem::path& path, BeforeMigration before
   if (version > 0 && before == BeforeMigration::keep_copy) {
     keep_copy_before_migration(handle_, path, static_cast<std::int64_t>(version));
   }
-  SQLite::Transaction transaction{handle_, SQLite::TransactionBehavior::IMMEDIATE};
-  for (const char* script : migrations().subspan(version)) handle_.exec(script);
-  if (version == 0) {
-    std::uint64_t store_id = 0;
-    randombytes_buf(&store_id, sizeof store_id);
-    SQLite::Statement add{handle_, "INSERT INTO meta (name, value) VALUES (?, ?)"};
-    execute(add, "store_id", store_id);
-    execute(add, "next_row", std::int64_t{1});
+  try {
+    run_migrations(handle_, version);
+  } catch (const SQLite::Exception& error) {
+    if (error.getErrorCode() != SQLITE_FULL || version == 0) throw;
+    refuse_without_room(path, version);
   }
-  handle_.exec(fmt::format("PRAGMA application_id = {}", kApplicationId));
-  handle_.exec(fmt::format("PRAGMA user_version = {}", migrations().size()));
-  transaction.commit();
 }
 
 void Database::checkpoint() { handle_.exec("PRAGMA wal_checkpoint(TRUNCATE)"); }

@@ -10,6 +10,7 @@
 #include <fstream>
 
 #include "server/storage/database/disk_reserve.hpp"
+#include "server/storage/database/schema.hpp"
 #include "tests/server/recording/recording_test.hpp"
 #include "tests/server/recording/schema_dump.hpp"
 #include "tests/server/recording/stored_runs.hpp"
@@ -205,6 +206,31 @@ TEST_F(DiskFullTest, ADatabaseOfAnOlderSchemaStaysAsItIsWhereACopyOfItDoesNotFit
   }
   const storage::Database database{path_};
   EXPECT_TRUE(fs::exists(folder_ / "station.sqlite.schema-6"));
+}
+
+TEST_F(DiskFullTest, ADatabaseOfAnOlderSchemaStaysAsItIsWhereItsMigrationDoesNotFit) {
+  kill();
+  fs::remove_all(folder_);
+  fs::create_directories(folder_);
+  make_database(path_, "version_6.sql");
+  const fs::path kept = folder_ / "kept";
+  std::ofstream{kept, std::ios::binary} << std::string(100'000, 'x');
+  {
+    const Filler filler{disk()};
+    fs::remove(kept);
+    try {
+      const storage::Database database{path_, storage::BeforeMigration::change_in_place};
+      ADD_FAILURE() << "it was migrated on a full disk";
+    } catch (const std::runtime_error& error) {
+      EXPECT_THAT(error.what(),
+                  HasSubstr("from schema 6 to the present one: the disk became full. The database has 0."));
+      EXPECT_THAT(error.what(), HasSubstr(" MB: make room for as much again in " + folder_.string()));
+    }
+    EXPECT_EQ(number("PRAGMA user_version"), 6);
+    EXPECT_EQ(rows("PRAGMA integrity_check"), std::vector<std::string>{"ok"});
+  }
+  const storage::Database database{path_};
+  EXPECT_EQ(number("PRAGMA user_version"), static_cast<std::int64_t>(storage::migrations().size()));
 }
 
 // Mounts the disks and makes the first of them the folder of temporary files.
