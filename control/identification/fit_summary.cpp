@@ -14,6 +14,7 @@ using Eigen::Index;
 
 constexpr double kSmallestResidualShare = 1e-9;  // of the signal; what is less is rounding and no reason to choose
 constexpr double kWhite = 0.01;
+constexpr double kFitOfRounding = 100 - 1e-6;  // percent; what is left is no noise
 
 double akaike(const OutputErrorSearch& search, Cost cost, const std::vector<Eigen::VectorXd>& residuals,
               const std::vector<const std::vector<double>*>& measured, int free_parameters) {
@@ -91,13 +92,17 @@ const std::vector<double>& measured_of(Channel channel, const Recording& recordi
                                         : recording.acceleration_m_s2;
 }
 
-void add_whiteness(const OutputErrorSearch& search, const std::vector<Eigen::VectorXd>& residuals, Fit& fit) {
+void add_whiteness(const OutputErrorSearch& search, const std::vector<Eigen::VectorXd>& residuals, double duration_s,
+                   Fit& fit) {
   const std::vector<Channel> channels = search.channels();
   fit.whiteness_p_value = 1;
   for (std::size_t c = 0; c < residuals.size(); ++c) {
-    const double p = whiteness_p_value(search.counted(residuals[c]));
+    const Eigen::VectorXd counted = search.counted(residuals[c]);
+    const double p = whiteness_p_value(counted);
     p_value_of(channels[c], fit) = p;
     fit.whiteness_p_value = std::min(fit.whiteness_p_value, p);
+    if (!(fit.fit_percent < kFitOfRounding)) continue;
+    fit.drift_factor = std::max(fit.drift_factor, drift_factor(counted, values_in_2_s(counted.size(), duration_s)));
   }
   fit.residuals_are_white = fit.whiteness_p_value >= kWhite;
 }
@@ -129,7 +134,7 @@ Fit summary(OutputErrorSearch& search, const Recording& recording, Cost cost, St
     fit.absolute_error += residuals[c].lpNorm<1>() * recording.dt_s;
   }
   add_quality(search, residuals.front(), *measured.front(), recording.position_sd_m, fit);
-  add_whiteness(search, residuals, fit);
+  add_whiteness(search, residuals, recording.dt_s * static_cast<double>(recording.duty.size()), fit);
   fit.aic = akaike(search, cost, residuals, measured, fit.free_parameters);
   if (found.starts > 0) add_uncertainty(search, found.point, residuals, cost, fit);
   return fit;

@@ -79,8 +79,11 @@ Fit evaluate(const FractionalModel& model, const Recording& recording, const Ide
   if (search.channels().front() == Channel::position && options.fits_offset) {
     found.point.offset_m = best_offset_m(search, found.point);
   }
+  search.keep_dead_time(model.dead_time_s, found.point);
   found.end = search.sensor_search_end().value_or(SearchEnd::converged);
   Fit fit = summary(search, recording, options.cost, Structure::fractional, found);
+  fit.model.dead_time_s = model.dead_time_s;  // an acceleration shows only the sum of it and the sensor's delay
+  if (fit.sensor) fit.sensor->delay_s -= model.dead_time_s;
   fit.one_sigma = {};
   fit.correlation = {};
   return fit;

@@ -69,8 +69,10 @@ inline constexpr std::size_t kMostRecordings = 8;
 Identification identify_together(std::span<const Recording> recordings, const IdentificationOptions& options);
 
 // How well a model follows a recording that it was not fitted to. Its parameters stay as they are, divided by b3;
-// fitted are the position's offset, and of an acceleration the sensor's bias, lag and clock. The dead time of a model
-// is in the sensor's lag then. No parameter has a sigma. The options' structure and dead time are not looked at.
+// fitted are the position's offset, and of an acceleration the sensor's bias, lag and clock. The lag comes on top of
+// the model's dead time: from half a period less, by which it is uncertain, to 6.5 periods more, which are the most
+// that a fit without a dead time takes for the age of the readings. No parameter has a sigma. The options' structure
+// and dead time are not looked at.
 Fit evaluate(const FractionalModel& model, const Recording& recording, const IdentificationOptions& options = {});
 
 }  // namespace control

@@ -117,6 +117,7 @@ void add_quality(JointSearch& search, const JointResult& found, JointFit& fit) {
     values += n;
     motion += n / std::max(1e-300, ratio * ratio);
     least = std::min(least, run.whiteness_p_value);
+    fit.all.drift_factor = std::max(fit.all.drift_factor, run.drift_factor);
     fit.all.sse += run.sse;
     fit.all.absolute_error += run.absolute_error;
     if (search.of_run(i).channels().front() != search.of_run(0).channels().front()) continue;

@@ -94,6 +94,22 @@ void add_colour(const ChannelResidual& channel, std::vector<std::string>& warnin
   warnings.push_back(text.str());
 }
 
+// Under noise a slow drift is too small for the short lags of the whiteness.
+void add_drift(const ChannelResidual& channel, double duration_s, std::vector<std::string>& warnings) {
+  if (channel.whiteness_p_value < kWhite) return;
+  const Eigen::Map<const Eigen::VectorXd> r(channel.residual.data(), static_cast<Index>(channel.residual.size()));
+  const double factor = drift_factor(r, values_in_2_s(r.size(), duration_s));
+  if (!(factor > 1)) return;
+  std::ostringstream text;
+  text.precision(2);
+  text << "the residuals of " << channel.name
+       << " drift: they look white from value to value, but their means over 2 s "
+       << "and more scatter " << factor
+       << " times as much as those of white noise; the sigmas may be too small by up to "
+       << "this factor; look for a flow, or a sensor that drifts";
+  warnings.push_back(text.str());
+}
+
 }  // namespace
 
 double fit_percent(const OutputErrorSearch& search, const std::vector<double>& residual,
@@ -134,6 +150,8 @@ std::vector<std::string> residual_doubts(const OutputErrorSearch& search, const 
   for (const ChannelResidual& channel : channels) add_poor_fit(channel, fit, warnings);
   for (const ChannelResidual& channel : channels) add_mean(channel, warnings);
   for (const ChannelResidual& channel : channels) add_colour(channel, warnings);
+  const double duration_s = recording.dt_s * static_cast<double>(recording.duty.size());
+  for (const ChannelResidual& channel : channels) add_drift(channel, duration_s, warnings);
   return warnings;
 }
 

@@ -24,6 +24,7 @@ constexpr std::ptrdiff_t kFewest = 20;                    // samples of the begi
 constexpr double kRoughBeginning = 3;                     // times the size of the other residuals, by the medians
 constexpr double kNoticeableLagS = 0.002;                 // twice what the age of the samples is known to
 constexpr double kMotionSigmas = 5, kMotionShare = 0.01;  // of v0, and of the squares that it explains
+constexpr double kNoticeableRows = 0.3;                   // of a duty that is shifted, to first order
 
 double lowest_percent(const OutputErrorSearch& search, const Recording& recording, const Fit& fit) {
   return std::min({fit_percent(search, fit.position_residual_m, recording.position_m, recording.position_sd_m),
@@ -216,6 +217,56 @@ void add_initial_motion(OutputErrorSearch& search, const Recording& recording, c
   warnings.push_back(text.str());
 }
 
+// The duty of each row taken to be that of the row before it, or behind it.
+Recording with_shifted_duty(Recording recording, bool is_later) {
+  std::vector<double>& duty = recording.duty;
+  if (is_later) {
+    std::copy_backward(duty.begin(), duty.end() - 1, duty.end());
+  } else {
+    std::copy(duty.begin() + 1, duty.end(), duty.begin());
+  }
+  return recording;
+}
+
+// By how many rows the output comes late, to first order, the parameters of the model being free; 0: within its noise.
+double rows_late(OutputErrorSearch& search, const Recording& recording, const Fit& fit) {
+  const Stacked all = stacked(search, recording, fit);
+  const auto late = search.late_outputs({0, 1}, {fit.model, fit.offset_m});
+  Eigen::VectorXd a_row(all.residual.size());
+  for (std::size_t c = 0; c < late.size(); ++c) {
+    const Eigen::VectorXd change = late[c].col(1) - late[c].col(0);
+    a_row.segment(static_cast<Index>(c) * all.tick.size(), all.tick.size()) = search.counted(change) / all.sd[c];
+  }
+  const Eigen::VectorXd scale = all.slopes.colwise().norm().transpose().cwiseMax(1e-300).cwiseInverse();
+  const Eigen::MatrixXd slopes = all.slopes * scale.asDiagonal();
+  if (!slopes.allFinite() || !all.residual.allFinite()) return 0;
+  const Eigen::VectorXd own = a_row - slopes * slopes.colPivHouseholderQr().solve(a_row);
+  const double rows = own.dot(all.residual) / std::max(1e-300, own.squaredNorm());
+  return std::abs(rows) * own.norm() > kMotionSigmas && std::abs(rows) > kNoticeableRows ? rows : 0;
+}
+
+// A duty that stands one row too early or too late moves the parameters by many sigmas. The fit is made again only
+// where the residuals ask for it. Of a structure that is forced, an order too low looks the same.
+void add_shifted_duty(OutputErrorSearch& search, const Recording& recording, const IdentificationOptions& options,
+                      const Fit& fit, std::vector<std::string>& warnings) {
+  if (options.structure && *options.structure != Structure::fractional) return;
+  if (!(lowest_percent(search, recording, fit) < 100 - 1e-6)) return;  // rounding
+  const double rows = rows_late(search, recording, fit);
+  if (rows == 0) return;
+  const auto shifted = fit_again(search, with_shifted_duty(recording, rows > 0), options, fit.structure);
+  if (!shifted || !(shifted->aic < fit.aic - kClearlyLowerAic)) return;
+  std::ostringstream text;
+  text.precision(3);
+  text << "with the duty one row " << (rows > 0 ? "later" : "earlier")
+       << " the model explains clearly more (AIC lower by " << fit.aic - shifted->aic
+       << ", kp, b1, b2, alpha, beta = " << shifted->model.kp << ", " << shifted->model.b1 << ", " << shifted->model.b2
+       << ", " << shifted->model.alpha << ", " << shifted->model.beta
+       << "): the duty of a row must be what the motor has from that row on to the next; "
+       << (rows > 0 ? "move the column down by a row, or search for a dead time (--dead-time-s), if there is one"
+                    : "move the column up by a row");
+  warnings.push_back(text.str());
+}
+
 }  // namespace
 
 std::vector<std::string> sensor_doubts(const OutputErrorSearch& search) {
@@ -269,7 +320,9 @@ std::vector<std::string> second_opinions(OutputErrorSearch& search, const Record
   add_turned_sign(search, recording, options, fit, warnings);
   if (!warnings.empty()) return warnings;
   add_missing_offset(search, recording, options, fit, warnings);
-  if (!fit.sensor && recording.position_time_s.empty()) add_initial_motion(search, recording, fit, warnings);
+  if (fit.sensor || !recording.position_time_s.empty()) return warnings;  // they have a clock of their own
+  add_initial_motion(search, recording, fit, warnings);
+  add_shifted_duty(search, recording, options, fit, warnings);
   return warnings;
 }
 

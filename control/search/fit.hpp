@@ -97,6 +97,9 @@ struct Fit {
   int free_parameters = 0;  // of the model, and offset and dead time if they are fitted; the noise's sd is not counted
   bool residuals_are_white = false;
   double whiteness_p_value = 0;  // Ljung-Box, the smallest of the channels; white means at least 0.01
+  // The largest of the channels, (8) of fit_statistics.hpp over 2 s and longer: by how much a slow drift makes sigmas
+  // too small, which the whiteness at short lags does not show; 1: none is seen.
+  double drift_factor = 1;
   std::optional<double> position_whiteness_p_value, velocity_whiteness_p_value, acceleration_whiteness_p_value;
   SearchEnd end = SearchEnd::converged;
   // iterations: of the best start; starts: made, 0 if the structure was never searched; agree: with the best cost

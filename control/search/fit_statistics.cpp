@@ -94,6 +94,27 @@ double samples_per_independent_one(const Eigen::VectorXd& residual) {
   return sum;
 }
 
+double drift_factor(const Eigen::VectorXd& residual, Index values_per_mean) {
+  constexpr Index kFewestMeans = 10;
+  constexpr double kLeast = 1.3, kSigmas = 3.1;
+  double factor = 1;
+  for (Index length = std::max<Index>(2, values_per_mean); residual.size() / length >= kFewestMeans; length *= 2) {
+    const Index count = residual.size() / length;
+    const Eigen::Map<const Eigen::MatrixXd> pieces(residual.data(), length, count);
+    const double mean = pieces.mean(), variance = (pieces.array() - mean).square().mean();
+    const double freedom = static_cast<double>(count - 1), spread = 2 / (9 * freedom);
+    const double of_means = (pieces.colwise().mean().array() - mean).square().sum() / freedom;
+    const double ratio = static_cast<double>(length) * of_means / std::max(1e-300, variance);  // (8)
+    const double by_chance = std::pow(1 - spread + kSigmas * std::sqrt(spread), 3);            // Wilson and Hilferty
+    if (ratio > by_chance && ratio > kLeast * kLeast) factor = std::max(factor, std::sqrt(ratio));
+  }
+  return factor;
+}
+
+Index values_in_2_s(Index values, double duration_s) {
+  return static_cast<Index>(std::lround(2 / duration_s * static_cast<double>(values)));
+}
+
 double median(std::vector<double> values) {
   if (values.empty()) return 0;
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);

@@ -63,6 +63,10 @@ class OutputErrorSearch {
   std::optional<SensorFit> sensor_fit(const SearchPoint& point);  // none: no acceleration was recorded
   double sensor_lag_s(const SearchPoint& point) const;            // dead time and all, its sampling aside
   double dead_time_s(const SearchPoint& point) const;
+  // Of an acceleration: the search puts every delay into the sensor's timing. Of a model whose dead time is given, the
+  // readings come later than that, by no more than a search without a dead time lets them: nothing else is the
+  // sensor's.
+  void keep_dead_time(double dead_time_s, SearchPoint& point) const;
   const SensorPath* sensor() const { return measured_.front().path.get(); }
   const PositionTimes* position_times() const { return measured_.front().times.get(); }
 
@@ -111,7 +115,8 @@ class OutputErrorSearch {
   void find_delay(SearchPoint& point);
   bool find_own_clock(SearchPoint& point);
   bool descend_again(SearchPoint& point);
-  double sensor_sd(const SearchPoint& point);  // of a reading
+  double sensor_sd(const SearchPoint& point);            // of a reading
+  double reading_lag_s(const SearchPoint& point) const;  // dead time and all, its sampling aside
   void run_starts(Structure structure, SearchResult& result);
   void make_scan(const Recording& recording);
   SearchEnd descend(Structure structure, SearchPoint& point, int iteration_limit, Progress progress,

@@ -16,6 +16,8 @@ constexpr double kClearlyBetter =
     30;                              // in twice the log likelihood, for a clock of three unknowns that was scanned for
 constexpr double kNearLimit = 0.01;  // ticks
 constexpr double kInStep = 0.1;      // ticks that the clock runs ahead or behind in the whole record
+constexpr double kOldestReading = 6.5,
+                 kNewestReading = -0.5;  // ticks beyond the dead time; the most of a search without
 // Of each round, in ticks: how far the order of the samples is sought, and how near to a change readings do not count.
 struct Round {
   double range, guard;
@@ -119,11 +121,21 @@ bool OutputErrorSearch::find_own_clock(SearchPoint& point) {
   return true;
 }
 
-double OutputErrorSearch::sensor_lag_s(const SearchPoint& point) const {
+// Below 0 where the readings seem to come before what they measure.
+double OutputErrorSearch::reading_lag_s(const SearchPoint& point) const {
   const SensorPath& path = *sensor();
   const double delay_s = dt_s_ * static_cast<double>(path.delay_ticks()) - point.sensor.first_s;
   const double age_s = path.has_own_clock() ? -path.order().first_available_s : dt_s_ / 2;  // in step: not known
-  return std::max(0.0, delay_s - age_s);
+  return delay_s - age_s;
+}
+
+double OutputErrorSearch::sensor_lag_s(const SearchPoint& point) const { return std::max(0.0, reading_lag_s(point)); }
+
+void OutputErrorSearch::keep_dead_time(double dead_time_s, SearchPoint& point) const {
+  if (!sensor() || !(dead_time_s > 0)) return;
+  const double lag_s = reading_lag_s(point);
+  const double kept_s = std::clamp(lag_s, dead_time_s + kNewestReading * dt_s_, dead_time_s + kOldestReading * dt_s_);
+  point.sensor.first_s -= kept_s - lag_s;
 }
 
 // Of a recorded acceleration it is what the sensor's own lag, if that is known, does not explain.

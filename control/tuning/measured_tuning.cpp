@@ -13,6 +13,8 @@ namespace control {
 namespace {
 
 constexpr double kSameCrossover = 1e-9;  // relative
+// What the method itself may be wrong by, as three_tones.hpp states it: no noise, so no sigma of the record has it.
+constexpr double kModulusError = 0.014, kPhaseErrorDeg = 0.3, kPhaseFallError = 0.043;
 
 void check(const MeasuredPlant& plant, const TuningSpec& spec) {
   const double measured_rad_s = plant.at_crossover().omega_rad_s;
@@ -57,9 +59,10 @@ std::string why_not_sound(const MeasuredPlant& plant, const FopdController& cont
 void add_sigmas(const MeasuredPlant& plant, MeasuredTuning& tuning) {
   const MeasuredPoint& at = plant.at_crossover();
   const double slope = std::abs(gain_slope(plant, *tuning.controller));
-  tuning.phase_margin_sigma_deg = at.sigma * kDegPerRad;
-  tuning.crossover_sigma_rad_s = at.sigma / slope * at.omega_rad_s;
-  tuning.phase_slope_sigma_deg_per_rad_s = plant.phase_fall_sigma * kDegPerRad / at.omega_rad_s;
+  const double phase_fall_sigma = std::hypot(plant.phase_fall_sigma, kPhaseFallError * plant.phase_fall);
+  tuning.phase_margin_sigma_deg = std::hypot(at.sigma * kDegPerRad, kPhaseErrorDeg);
+  tuning.crossover_sigma_rad_s = std::hypot(at.sigma, kModulusError) / slope * at.omega_rad_s;
+  tuning.phase_slope_sigma_deg_per_rad_s = phase_fall_sigma * kDegPerRad / at.omega_rad_s;
 }
 
 }  // namespace

@@ -23,7 +23,8 @@ struct MeasuredTuning {
   std::optional<FopdController> controller;
   std::string reason;                    // if there is none
   double theta_deg = 0, phase_fall = 0;  // θ and R
-  // One sigma of what is achieved, from that of the measurement.
+  // One sigma of what is achieved: that of the measurement, with the errors of the method that three_tones.hpp states,
+  // the largest of ten fluids, in quadrature.
   double phase_margin_sigma_deg = 0, crossover_sigma_rad_s = 0;
   double phase_slope_sigma_deg_per_rad_s = 0;
 };

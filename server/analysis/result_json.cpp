@@ -84,6 +84,7 @@ OrderedJson json_of(const control::Fit& fit) {
           {"free_parameters", fit.free_parameters},
           {"residuals_are_white", fit.residuals_are_white},
           {"whiteness_p_value", fit.whiteness_p_value},
+          {"drift_factor", fit.drift_factor},
           {"position_whiteness_p_value", or_null(fit.position_whiteness_p_value)},
           {"velocity_whiteness_p_value", or_null(fit.velocity_whiteness_p_value)},
           {"acceleration_whiteness_p_value", or_null(fit.acceleration_whiteness_p_value)},

@@ -235,8 +235,13 @@ TEST(MeasuredTuning, IsThatOfTheModelForExactNumbers) {
   EXPECT_NEAR(found.controller->kp / of_model.kp, 1, 1e-9);
   EXPECT_NEAR(found.controller->kd / of_model.kd, 1, 1e-9);
   EXPECT_NEAR(found.controller->mu / of_model.mu, 1, 1e-9);
-  EXPECT_NEAR(found.phase_margin_sigma_deg, 0.573, 0.001);
-  EXPECT_GT(found.crossover_sigma_rad_s, 0);
+  EXPECT_NEAR(found.phase_margin_sigma_deg, std::hypot(0.573, 0.3), 0.001) << "of the noise, and of the method";
+  for (MeasuredPoint& point : plant.points) point.sigma = 0;
+  plant.phase_fall_sigma = 0;
+  const MeasuredTuning without_noise = tune_measured(plant, spec);
+  EXPECT_NEAR(without_noise.phase_margin_sigma_deg, 0.3, 1e-9);
+  EXPECT_NEAR(found.crossover_sigma_rad_s / without_noise.crossover_sigma_rad_s, std::hypot(0.01, 0.014) / 0.014, 1e-9);
+  EXPECT_NEAR(without_noise.phase_slope_sigma_deg_per_rad_s, 0.043 * plant.phase_fall * 180 / M_PI / kCrossover, 1e-9);
 
   const MeasuredTuning infeasible = tune_measured(plant, {kCrossover, 60, {}, false});
   EXPECT_FALSE(infeasible.controller);

@@ -167,7 +167,7 @@ RecordedRun Commissioning::record_run(const json& profile) {
   if (run.samples.empty()) throw std::runtime_error{"no samples of the run came: see to the link"};
   // Each run begins with a new zero, where the one before has ended.
   travel_.zero_m += last_end_.position_m;
-  travel_.zero_sd_m += last_end_.position_sd_m;
+  travel_.zero_sd_m = sum_of(travel_.zero_sd_m, last_end_.position_sd_m);
   last_end_ = run.samples.back();
   return run;
 }

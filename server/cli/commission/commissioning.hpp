@@ -59,7 +59,7 @@ class Commissioning {
   DirectionFacts direction_;
   MotorFacts motor_;
   TravelFacts travel_;
-  RecordedSample last_end_;  // of the run before
+  RecordedSample last_end_{.position_sd_m = 0};  // of the run before; before the first it lies where the ruler does
 };
 
 }  // namespace server::cli

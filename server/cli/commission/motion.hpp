@@ -23,7 +23,8 @@ namespace server::cli {
 
 struct RecordedSample {
   std::int64_t robot_time_us = 0;
-  double position_m = 0, position_sd_m = 0;  // the robot's own estimate
+  double position_m = 0;                  // the robot's own estimate
+  std::optional<double> position_sd_m{};  // none: not known
   double acceleration_m_s2 = 0;
   double duty = 0;
   double impedance_mv = 0;

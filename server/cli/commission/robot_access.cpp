@@ -46,15 +46,23 @@ class Deadline {
 
 double number_or_0(const json& value) { return value.is_number() ? value.get<double>() : 0; }
 
+std::optional<double> number_or_none(const json& value) {
+  return value.is_number() ? std::optional{value.get<double>()} : std::nullopt;
+}
+
+}  // namespace
+
 RecordedSample sample_in(const json& row) {
   return {row.at("robot_time_us").get<std::int64_t>(),
           number_or_0(row.at("position_m")),
-          number_or_0(row.at("position_sd_m")),
+          number_or_none(row.at("position_sd_m")),
           number_or_0(row.at("acceleration_m_s2")),
           number_or_0(row.at("duty")),
           number_or_0(row.at("impedance_mv")),
           row.at("flags").get<long>()};
 }
+
+namespace {
 
 std::int64_t steady_us() {
   boost::asio::io_context loop;

@@ -32,6 +32,8 @@ struct RecordedRun {
   nlohmann::ordered_json reference;  // run_id, purpose, counts of samples, digest
 };
 
+RecordedSample sample_in(const nlohmann::json& row);  // of a page of samples
+
 class RobotAccess {
  public:
   RobotAccess(const std::filesystem::path& data_dir, std::string robot_id, Interruption& interruption);

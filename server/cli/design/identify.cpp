@@ -34,7 +34,8 @@ std::array<double, kParameters> values_of(const control::FractionalModel& model)
 
 void add_source(CLI::App& command, Identify& options) {
   auto* csv = command.add_option("--csv", options.csv,
-                                 "Recording with columns t_s (equally spaced), duty, and position_m or velocity_m_s");
+                                 "Recording with columns t_s (equally spaced), duty (of a row: from it to the next), "
+                                 "and position_m or velocity_m_s");
   csv->check(named());
   auto* run = command.add_option("--run", options.runs,
                                  "A recorded run by its number; may be given several times, for one model of all");
@@ -184,9 +185,11 @@ void write_parameters(std::ostream& out, const Fit& fit, bool is_of_one_run) {
   const std::string offset = is_of_one_run ? fmt::format("offset {} m, ", cell(fit.offset_m, 4)) : std::string{};
   fmt::print(out, "fit {} %, residual sd {}, sse {}; {}dead time {} s\n", fixed(fit.fit_percent, 3),
              cell(fit.residual_sd, 4), cell(fit.sse), offset, cell(fit.model.dead_time_s, 4));
-  fmt::print(out, "residuals {} white (p = {}); {} after {} iterations; {} of {} starts agree\n",
-             fit.residuals_are_white ? "look" : "are not", cell(fit.whiteness_p_value, 3), text(fit.end),
-             fit.iterations, fit.starts_that_agree, fit.starts);
+  const char* residuals = !fit.residuals_are_white ? "are not white"
+                          : fit.drift_factor > 1   ? "drift, and look white from value to value only"
+                                                   : "look white";
+  fmt::print(out, "residuals {} (p = {}); {} after {} iterations; {} of {} starts agree\n", residuals,
+             cell(fit.whiteness_p_value, 3), text(fit.end), fit.iterations, fit.starts_that_agree, fit.starts);
   if (fit.sensor) write_sensor(out, *fit.sensor);
   if (fit.position_clock_sigma_s) {
     fmt::print(out, "clock of the position from outside: {} ms late, one sigma {} ms\n",

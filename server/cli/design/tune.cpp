@@ -7,6 +7,7 @@
 #include <CLI/CLI.hpp>
 
 #include "control/tuning/tuning_alternatives.hpp"
+#include "server/analysis/tuning/margin_sigmas.hpp"
 #include "server/analysis/tuning/tuning_json.hpp"
 #include "server/cli/design/discretise.hpp"
 #include "server/cli/design/robustness_table.hpp"
@@ -77,9 +78,23 @@ void write_ranges(std::ostream& out, const Tune& options, const Ranges& ranges) 
              ranges_in_words(ranges));
 }
 
+// ± 2 sd of margin and crossover, or that they are not known; nothing for the paper's models.
+void write_margin_sigmas(std::ostream& out, const PlantChoice& choice, const control::FractionalModel& plant,
+                         const control::TuningResult& result) {
+  if (!choice.file || *choice.file == "newtonian" || *choice.file == "non_newtonian") return;
+  const auto sigmas = analysis::margin_sigmas(plant, result, read_uncertainty(choice));
+  if (!sigmas) {
+    fmt::print(out, "the sigmas of the plant's parameters are not known: the margin takes them as exact\n");
+    return;
+  }
+  fmt::print(out, "by the sigmas of the plant's fit (± 2 sd): phase margin ± {} deg, gain crossover ± {} rad/s\n",
+             cell(2 * sigmas->phase_margin_deg, 2), cell(2 * sigmas->gain_crossover_rad_s, 2));
+}
+
 analysis::OrderedJson answer_of(const Tune& options, const control::FractionalModel& plant,
                                 const control::TuningResult& result, const Ranges& ranges) {
   analysis::OrderedJson answer = analysis::tuning_json(plant, options.spec, result, ranges);
+  analysis::add_margin_sigmas(plant, result, read_uncertainty(options.plant), answer);
   if (options.with_robustness && result.tuned) {
     answer["robustness"] = analysis::json_of(robustness_of(plant, result.tuned->controller));
   }
@@ -187,6 +202,7 @@ int run(const Tune& options, std::ostream& out) {
     write_json(out, answer_of(options, plant, result, ranges));
   } else if (result.tuned) {
     write_asked_and_achieved(out, options, *result.tuned);
+    write_margin_sigmas(out, options.plant, plant, result);
     write_ranges(out, options, ranges);
     if (options.with_robustness) write_robustness(out, robustness_of(plant, result.tuned->controller));
   } else {

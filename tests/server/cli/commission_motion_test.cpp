@@ -219,6 +219,17 @@ TEST(CommissionMotion, DoubtsAFitThatSaysLittle) {
   EXPECT_THAT(failed.found, HasSubstr("a gap"));
 }
 
+TEST(CommissionMotion, APositionOfUnknownUncertaintyIsNotCertain) {
+  json row{
+      {"robot_time_us", 1},  {"position_m", 0.1}, {"position_sd_m", nullptr}, {"acceleration_m_s2", 0}, {"duty", 0},
+      {"impedance_mv", 500}, {"flags", 0}};
+  EXPECT_EQ(sample_in(row).position_sd_m, std::nullopt);
+  row["position_sd_m"] = 0.002;
+  EXPECT_EQ(sample_in(row).position_sd_m, 0.002);
+  EXPECT_EQ(sum_of(0.002, std::nullopt), std::nullopt);
+  EXPECT_EQ(sum_of(0.002, 0.001), 0.003);
+}
+
 TEST(CommissionMotion, HoldsTheRobotsLimitsAgainstTheRulers) {
   TravelFacts facts{.ahead_m = 0.5, .behind_m = 0.4, .limit_min_m = -0.3, .limit_max_m = 0.4};
   facts.believed_m = 0.02;
@@ -232,6 +243,11 @@ TEST(CommissionMotion, HoldsTheRobotsLimitsAgainstTheRulers) {
   facts.zero_m = 0;
   facts.zero_sd_m = 0.06;
   EXPECT_EQ(judge_free_travel(facts).verdict, Verdict::attention) << "or nobody knows where it is";
+  facts.zero_sd_m = std::nullopt;
+  EXPECT_EQ(judge_free_travel(facts).verdict, Verdict::attention)
+      << "nor where the robot does not say how certain it is";
+  EXPECT_EQ(judge_free_travel(facts).figures.at("zero_sd_m"), nullptr);
+  EXPECT_THAT(judge_free_travel(facts).found, HasSubstr("its zero lies at +0 mm, ± not known of the start"));
   facts.zero_sd_m = 0;
   facts.measured_m = 0.023;
   EXPECT_EQ(judge_free_travel(facts).verdict, Verdict::pass) << "within 2 sd and the ruler's own error";

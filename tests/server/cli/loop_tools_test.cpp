@@ -121,6 +121,28 @@ TEST_F(LoopTools, TuneMeetsWhatIsAsked) {
   EXPECT_NEAR(json["achieved"]["phase_slope_deg_per_rad_s"], 0, 1e-7);
 }
 
+std::string fit_file(const char* sigma_of_alpha) {
+  return fmt::format(
+      R"({{"structure":"fractional","parameters":{{{}}},"one_sigma":{{"kp":0.002,"b1":0.0004,"b2":0.003,"alpha":{},)"
+      R"("beta":0.01}},"correlation":[[1,0,0,0,0],[0,1,0,0.5,0],[0,0,1,0,0],[0,0.5,0,1,0],[0,0,0,0,1]]}})",
+      kPromptPlant, sigma_of_alpha);
+}
+
+TEST_F(LoopTools, TuneSaysHowUncertainTheMarginIsByTheSigmasOfAFit) {
+  save("fit.json", fit_file("0.02"));
+  const std::string spec = " --crossover-rad-s 3 --phase-margin-deg 90";
+  const auto achieved = ask("tune --plant @fit.json --json" + spec).json()["achieved"];
+  const double sigma_deg = achieved["phase_margin_sigma_deg"];
+  EXPECT_GT(sigma_deg, 0.1);
+  EXPECT_GT(achieved["crossover_sigma_rad_s"], 0.01);
+  EXPECT_THAT(ask("tune --plant @fit.json" + spec).text,
+              HasSubstr(fmt::format("(± 2 sd): phase margin ± {:.2g} deg, gain crossover ± ", 2 * sigma_deg)));
+  save("fit.json", fit_file("null"));
+  EXPECT_EQ(ask("tune --plant @fit.json --json" + spec).json()["achieved"]["phase_margin_sigma_deg"], nullptr);
+  EXPECT_THAT(ask("tune --plant @fit.json" + spec).text, HasSubstr("are not known: the margin takes them as exact"));
+  EXPECT_THAT(ask("tune" + spec).text, Not(HasSubstr("sigmas")));
+}
+
 TEST_F(LoopTools, TuneWithAGivenMuReturnsThePapersController) {
   const auto json = ask("tune --crossover-rad-s 5.9995012056 --phase-margin-deg 64.99778607 --mu 0.6524 --json").json();
   EXPECT_NEAR(json["kp"], 65.0028, 1e-3);

@@ -137,4 +137,7 @@ test('what a fit is worth is said in sentences', () => {
     'b1 is hardly known: a duty that changes faster, or another run, tells more.',
     'The search did not come to its end (time limit).',
   ]);
+  expect(sentences_of({ ...fit, residuals_are_white: true, drift_factor: 2.68 })).toContain(
+    'What is left over drifts slowly: the true errors may be up to 2.7 times the ± of the parameters.',
+  );
 });

@@ -23,6 +23,7 @@ export interface Quality {
   residual_sd: number | null;
   residuals_are_white?: boolean;
   whiteness_p_value?: number | null;
+  drift_factor?: number;
 }
 
 export interface Fit extends Quality {

@@ -72,7 +72,12 @@ export function sentences_of(fit: Identified): string[] {
       `${capital(kStructureNames[fit.structure])} is ${by} ${kStructureNames[next.structure]}: its AIC is lower by ${number_text(gap, 3)}.`,
     );
   }
-  if (fit.residuals_are_white !== undefined && fit.residuals_are_white !== null)
+  const drift = fit.drift_factor ?? 1;
+  if (fit.residuals_are_white && drift > 1)
+    said.push(
+      `What is left over drifts slowly: the true errors may be up to ${number_text(drift, 2)} times the ± of the parameters.`,
+    );
+  else if (fit.residuals_are_white !== undefined && fit.residuals_are_white !== null)
     said.push(
       fit.residuals_are_white
         ? 'What is left over looks like noise alone, so the ± can be believed.'
