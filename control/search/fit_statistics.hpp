@@ -33,7 +33,7 @@ double absolute_error_scale(const Eigen::VectorXd& residual, int free_parameters
 
 double samples_per_independent_one(const Eigen::VectorXd& residual);  // n/n_effective of (7), at least 1
 
-// √R of (8), the largest of means over so many values, twice, four times and so on, while there are ten means: by how
+// √R of (8), the largest of means over this many values, twice, four times and so on, while there are ten means: by how
 // much sigmas of what is slow may be too small. 1 where chance explains R, or √R is below 1.3.
 double drift_factor(const Eigen::VectorXd& residual, Eigen::Index values_per_mean);
 Eigen::Index values_in_2_s(Eigen::Index values, double duration_s);  // of as many, evenly over the duration
