@@ -34,7 +34,11 @@ void append_words(std::string& out, std::initializer_list<std::uint64_t> words) 
 
 std::uint64_t padded(std::uint64_t size) { return (size + 7) / 8 * 8; }
 
+// Without a name from its beginning, so that a program that is killed leaves nothing; where the file system knows no
+// such file, it has a name for a moment.
 int unlinked_file(const std::filesystem::path& folder) {
+  const int nameless = ::open(folder.c_str(), O_TMPFILE | O_RDWR | O_EXCL | O_CLOEXEC, 0600);
+  if (nameless >= 0) return nameless;
   std::string name = (folder / "column-XXXXXX").string();
   const int file = ::mkostemp(name.data(), O_CLOEXEC);
   if (file < 0) fail_with("cannot create a file in " + folder.string());
