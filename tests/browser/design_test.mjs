@@ -140,6 +140,7 @@ const steps = {
       await page.locator('#design-refused button').first().click();
     }
     await of_station();
+    assert.match(await text('#design-achieved'), /Crossover, rad\/s\s+[\d.]+\s+[\d.]+ ± [\d.]+[\s\S]*Phase margin, °\s+[\d.]+\s+[\d.]+ ± [\d.]+/);
     await page.locator('#design-keep-controller:enabled').click();
     await says('controller=2');
     await page.locator('#design-coefficients').waitFor();

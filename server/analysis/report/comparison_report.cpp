@@ -48,6 +48,20 @@ double largest_sd_m(const AlignedRun& run) {
   return largest_m;
 }
 
+// Of how many positions it is not known stands beside the largest.
+std::string two_sd_text(const AlignedRun& run) {
+  const std::vector<float>&sds_m = run.trace.position_sd_m, &positions_m = run.trace.values[kPositionColumn];
+  std::size_t positions = 0, unknown = 0;
+  for (std::size_t i = 0; i < std::min(sds_m.size(), positions_m.size()); ++i) {
+    if (!std::isfinite(positions_m[i])) continue;
+    ++positions;
+    unknown += std::isfinite(sds_m[i]) ? 0 : 1;
+  }
+  if (unknown == 0) return fmt::format("{:.2g}", 2 * largest_sd_m(run));
+  if (unknown == positions) return "not known";
+  return fmt::format("{:.2g}; of {} of {} not known", 2 * largest_sd_m(run), unknown, positions);
+}
+
 std::string runs_table(const ComparisonReport& report) {
   std::string out =
       "<h2>Runs</h2>\n<div class=\"wide\"><table><tr><th></th><th>Run</th><th>Name</th><th>Robot</th>"
@@ -58,9 +72,9 @@ std::string runs_table(const ComparisonReport& report) {
     const AlignedRun& aligned = report.aligned.runs[i];
     out += fmt::format(
         "<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td class=\"number\">{:.2f}</td>"
-        "<td>{}</td><td class=\"number\">{:.2g}</td></tr>\n",
+        "<td>{}</td><td class=\"number\">{}</td></tr>\n",
         swatch(i), run.id, html_escaped(run.conditions.name), html_escaped(run.robot_id), utc_text(run.started_at_us),
-        aligned.aligned.at_s, html_escaped(source_in_words(aligned.trace.position_source)), 2 * largest_sd_m(aligned));
+        aligned.aligned.at_s, html_escaped(source_in_words(aligned.trace.position_source)), two_sd_text(aligned));
   }
   return out + "</table></div>\n";
 }

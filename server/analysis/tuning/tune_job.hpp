@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "server/analysis/tuning/margin_sigmas.hpp"
 #include "server/analysis/tuning/sampling.hpp"
 #include "server/analysis/tuning/tuning_json.hpp"
 #include "server/runtime/result.hpp"
@@ -19,6 +20,7 @@ namespace server::analysis {
 
 struct TuneRequest {
   control::FractionalModel plant;
+  PlantUncertainty plant_uncertainty;
   OrderedJson plant_source;  // {"model_id": …}, {"fluid": …} or {"given": true}
   control::TuningSpec spec;
   double period_s = 0.01;

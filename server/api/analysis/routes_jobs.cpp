@@ -71,6 +71,7 @@ std::vector<std::string> fluid_doubts(const std::vector<analysis::RunPart>& runs
 struct FoundPlant {
   control::FractionalModel model;
   analysis::OrderedJson source;
+  analysis::PlantUncertainty uncertainty = {};
 };
 
 Result<FoundPlant> plant_of_design(const Result<storage::Design>& design) {
@@ -79,9 +80,12 @@ Result<FoundPlant> plant_of_design(const Result<storage::Design>& design) {
     return fail(ErrorCode::invalid, fmt::format("design {} is a {}; give a model", design->id, text(design->made.kind)),
                 "other_kind");
   }
-  const auto model = analysis::model_from(json::parse(design->made.document, nullptr, false));
+  const json document = json::parse(design->made.document, nullptr, false);
+  const auto model = analysis::model_from(document);
   if (!model) return std::unexpected{model.error()};
-  return FoundPlant{*model, {{"model_id", design->id}}};
+  const auto uncertainty = analysis::uncertainty_from(document);
+  if (!uncertainty) return std::unexpected{uncertainty.error()};
+  return FoundPlant{*model, {{"model_id", design->id}}, *uncertainty};
 }
 
 Result<FoundPlant> plant_of_fluid(const station::FluidModelList& models, const std::string& fluid) {
@@ -94,7 +98,10 @@ Result<FoundPlant> plant_of_fluid(const station::FluidModelList& models, const s
 }
 
 boost::asio::awaitable<Result<FoundPlant>> find_plant(JobRoutes parts, PlantOfJob asked) {
-  if (asked.given) co_return FoundPlant{*asked.given, {{"given", true}}};
+  if (asked.given) {
+    FoundPlant given{*asked.given, {{"given", true}}, asked.given_uncertainty};
+    co_return given;
+  }
   if (!asked.model) co_return plant_of_fluid(parts.fluid_models.in_force(), asked.fluid);
   const auto design = co_await parts.designs.find(*asked.model);
   co_return plant_of_design(design);
@@ -126,6 +133,7 @@ boost::asio::awaitable<Work> work_of(JobRoutes parts, TuneBody body) {
   if (!plant) co_return std::unexpected{plant.error()};
   analysis::TuneRequest request = std::move(body.request);
   request.plant = plant->model;
+  request.plant_uncertainty = plant->uncertainty;
   request.plant_source = std::move(plant->source);
   request.fluids = plants_of_fluids(parts.fluid_models.in_force());
   auto work = [request = std::move(request)](storage::JobRun& job) { return analysis::tune_job(request, job); };

@@ -37,7 +37,10 @@ Result<void> read_plant(const Members& body, Range<std::int64_t> ids, Range<std:
   } else {
     const auto model = analysis::model_from(body.object().at("plant"));
     if (!model) return std::unexpected{model.error()};
+    const auto uncertainty = analysis::uncertainty_from(body.object().at("plant"));
+    if (!uncertainty) return std::unexpected{uncertainty.error()};
     plant.given = *model;
+    plant.given_uncertainty = *uncertainty;
   }
   return {};
 }

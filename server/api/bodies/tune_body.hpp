@@ -16,6 +16,7 @@ struct PlantOfJob {
   std::optional<storage::DesignId> model;  // a design
   std::string fluid;                       // its model in force
   std::optional<control::FractionalModel> given;
+  analysis::PlantUncertainty given_uncertainty;
 };
 
 // The plant, its source and the fluids of the requests are left to the route, which looks them up.

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 
 #include <fstream>
+#include <limits>
 
 #include "server/analysis/report/comparison_report.hpp"
 #include "server/api/bodies/document_body.hpp"
@@ -35,7 +36,7 @@ class ComparisonTest : public ApiTest {
     constexpr pb_size_t kSamples = 25;
     auto frame = TestRobot::samples_frame(next_seq_, kSamples, 1'000'000 + next_seq_ * 10'000, 0);
     protocol::Telemetry& telemetry = frame.body.telemetry;
-    telemetry.position_sd_m = 0.002F;
+    telemetry.position_sd_m = unknown_frames_-- > 0 ? std::numeric_limits<float>::quiet_NaN() : 0.002F;
     if (setpoint_m) {
       telemetry.mode = rheonaut_MODE_AUTO;
       telemetry.has_setpoint_m = true;
@@ -75,6 +76,7 @@ class ComparisonTest : public ApiTest {
   }
 
   std::uint64_t next_seq_ = 0, next_event_ = 0;
+  int unknown_frames_ = 0;  // of the next ones, whose position has no sd
 
  private:
   float position_m_ = 0;
@@ -200,6 +202,16 @@ TEST_F(ComparisonTest, TheReportShowsAllOfIt) {
   EXPECT_THAT(report.body, HasSubstr(certificate["sha256"].get<std::string>()));
   EXPECT_THAT(report.body, AllOf(Not(HasSubstr("<script")), Not(HasSubstr("http:")), Not(HasSubstr("src=\"")),
                                  Not(HasSubstr("url("))));
+}
+
+TEST_F(ComparisonTest, ItsReportSaysOfHowManyPositionsTheUncertaintyIsNotKnown) {
+  unknown_frames_ = 4;
+  record(0.1F);
+  unknown_frames_ = 6;
+  record(0.2F);
+  record(0.1F);
+  const std::string report = ask("GET", "/api/v1/run-comparison/report.html?runs=1,2,3").body;
+  EXPECT_THAT(report, AllOf(HasSubstr(">0.004; of "), HasSubstr(">not known</td>"), HasSubstr(">0.004</td>")));
 }
 
 TEST_F(ComparisonTest, AComparisonIsAJobToo) {

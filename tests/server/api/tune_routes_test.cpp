@@ -72,6 +72,27 @@ TEST_F(TuneRoutesTest, FindsTheControllerOfTheTunerReadyForRobotsAndPredictedInE
   EXPECT_LT(result["predicted"][1]["step"]["settling_s"], 1.2);
 }
 
+TEST_F(TuneRoutesTest, SaysHowUncertainTheMarginIsWhereTheModelIsOfAFit) {
+  json fit{{"structure", "fractional"},
+           {"parameters", plant_json()},
+           {"one_sigma", {{"kp", 0.001}, {"b1", 3e-4}, {"b2", 2e-3}, {"alpha", 0.01}, {"beta", 0.01}}},
+           {"correlation", json::array()}};
+  for (std::size_t i = 0; i < control::kParameters; ++i) {
+    fit["correlation"].push_back({i == 0, i == 1, i == 2, i == 3, i == 4});
+    for (json& value : fit["correlation"].back()) value = value.get<bool>() ? 1 : 0;
+  }
+  const json body{{"kind", "model"}, {"name", "of a fit"}, {"document", fit}};
+  ASSERT_EQ(ask("POST", "/api/v1/designs", body).status, 201);
+  const json of_design = done(specification())["achieved"];
+  EXPECT_GT(of_design["phase_margin_sigma_deg"], 0);
+  EXPECT_GT(of_design["crossover_sigma_rad_s"], 0);
+  json given = specification({{"plant", fit}});
+  given.erase("model_id");
+  EXPECT_EQ(done(given)["achieved"]["phase_margin_sigma_deg"], of_design["phase_margin_sigma_deg"]);
+  given["plant"] = plant_json();
+  EXPECT_EQ(done(given)["achieved"]["phase_margin_sigma_deg"], nullptr);
+}
+
 TEST_F(TuneRoutesTest, KeepsTheDutyRangeAndPeriodThatItIsGiven) {
   keep_model();
   const json result = done(specification({{"duty_min", 0}, {"duty_max", 0.8}, {"period_s", 0.02}}));

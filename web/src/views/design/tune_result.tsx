@@ -6,7 +6,7 @@ import type { Achieved, Measures, Near, RobustnessRow, Tuned } from './design_ap
 import { rounded } from './ask';
 import type { Solution, Specification } from './frequency';
 import { curve_name } from './step_plots';
-import { fixed_text, number_text } from './words';
+import { fixed_text, number_text, with_sigma } from './words';
 
 interface AchievementProps {
   asked: Specification;
@@ -25,7 +25,7 @@ export function Achievement({ asked, tuned, own, is_dragged, on_ask }: Achieveme
       <table class="design-table" id="design-achieved" data-source={tuned ? 'station' : 'page'}>
         <caption>
           {tuned
-            ? 'by the station, from the model: no measurement'
+            ? `by the station, from the model: no measurement${achieved?.phase_margin_sigma_deg ? '; ± one sigma, from its fit' : ''}`
             : is_dragged
               ? 'by this page, until the slider rests'
               : 'by this page, until the station answers'}
@@ -53,13 +53,13 @@ export function Achievement({ asked, tuned, own, is_dragged, on_ask }: Achieveme
             name="Crossover, rad/s"
             asked={number_text(asked.crossover_rad_s)}
             of={[achieved, sampled]}
-            text={({ gain_crossover_rad_s }) => fixed_text(gain_crossover_rad_s, 3)}
+            text={(margins) => uncertain_text(margins.gain_crossover_rad_s, margins.crossover_sigma_rad_s, 3)}
           />
           <Line
             name="Phase margin, °"
             asked={number_text(asked.phase_margin_deg)}
             of={[achieved, sampled]}
-            text={({ phase_margin_deg }) => fixed_text(phase_margin_deg, 2)}
+            text={(margins) => uncertain_text(margins.phase_margin_deg, margins.phase_margin_sigma_deg, 2)}
           />
           <Line
             name="Phase slope, °/(rad/s)"
@@ -92,6 +92,9 @@ export function Achievement({ asked, tuned, own, is_dragged, on_ask }: Achieveme
     </>
   );
 }
+
+const uncertain_text = (value: number, sigma: number | null | undefined, decimals: number) =>
+  sigma ? with_sigma(value, sigma) : fixed_text(value, decimals);
 
 interface LineProps {
   name: string;
