@@ -72,7 +72,7 @@ void Commissioning::add(StepFinding finding) {
 
 void Commissioning::look_at_robot() {
   const json state = robot_.state(), station = robot_.station(), controller = robot_.controller();
-  const json latch = state.at("emergency_id");
+  const json& latch = state.at("emergency_id");
   if (state.at("link") != "connected" || state.at("sample").is_null()) {
     throw std::runtime_error{fmt::format("the robot '{}' is not connected", record_.robot_id)};
   }
@@ -88,7 +88,7 @@ void Commissioning::look_at_robot() {
   plan_.is_one_way = value_of(controller, "duty_min", -1) >= 0;
   travel_.limit_min_m = value_of(parameters_, "position_limit_min_m", travel_.limit_min_m);
   travel_.limit_max_m = value_of(parameters_, "position_limit_max_m", travel_.limit_max_m);
-  const json status = state.at("status"), path = state.at("stop_path");
+  const json &status = state.at("status"), &path = state.at("stop_path");
   if (path.is_object() && path.at("round_trip_us").is_number()) {
     stops_.round_trip_ms = path.at("round_trip_us").get<double>() / kUsPerMs;
   }

@@ -10,6 +10,7 @@
 
 #include "server/analysis/control_json.hpp"
 #include "server/analysis/metrics/run_steps.hpp"
+#include "server/api/bodies/controller_body.hpp"
 #include "server/cli/design/robustness_table.hpp"
 #include "server/cli/terminal/options.hpp"
 #include "server/storage/samples/position_sd.hpp"
@@ -25,6 +26,7 @@ struct Measured {
   double began_at_s = 0;
   std::string position_source;  // in words
   std::string predicted_with;   // in words: what the run may not have had
+  std::optional<std::uint32_t> controller_checksum;
 };
 
 double largest_sd_m(std::span<const analysis::MeasuredStep> steps, bool is_from_outside) {
@@ -68,6 +70,27 @@ std::string predicted_with(const Predict& options, std::span<const storage::Stor
   return words;
 }
 
+// As a robot computes it that steers by the error, as the prediction does; none: no robot takes this controller.
+std::optional<std::uint32_t> checksum_of(const control::Discretisation& controller,
+                                         const control::ClosedLoopExperiment& experiment) {
+  const nlohmann::json made(analysis::json_of(controller));
+  nlohmann::json sent{{"duty_min", experiment.duty_min}, {"duty_max", experiment.duty_max}, {"derivative_on", "error"}};
+  for (const char* name : {"period_s", "dc_gain", "sections"}) sent["controller"][name] = made.at(name);
+  const auto message = api::controller_from(api::Members{sent}, nullptr);
+  return message ? std::optional{message->checksum} : std::nullopt;
+}
+
+// In words; empty where nothing can be compared.
+std::string controllers_in_words(std::optional<std::uint32_t> predicted, std::optional<std::uint32_t> of_run) {
+  if (!predicted || !of_run) return {};
+  if (*predicted == *of_run) return fmt::format("; the run began with this controller (checksum {:08x})", *of_run);
+  return fmt::format(
+      "; the run began with ANOTHER controller: its checksum is {:08x}, that of the prediction {:08x}, so "
+      "coefficients, "
+      "period, duty range or derivative differ",
+      *of_run, *predicted);
+}
+
 double time_of(std::span<const analysis::StepPoint> points, std::uint32_t span, std::uint64_t seq) {
   const auto is_of_span = [span](const analysis::StepPoint& point) { return point.span == span; };
   const auto first = std::ranges::find_if(points, is_of_span);
@@ -93,6 +116,7 @@ Measured follow(const Predict& options, control::ClosedLoopExperiment& experimen
   measured.began_at_s = first->at_s;
   measured.position_source = source_in_words(steps, reference);
   measured.predicted_with = predicted_with(options, samples);
+  measured.controller_checksum = read_controller_checksum(choice);
   experiment.setpoint_m = first->target_m - first->start_m;
   experiment.settling_band_m = first->band_m;  // of the robot's own step, also where the start is the true one
   experiment.duration_s = time_of(points, first->span, first->last_seq) - first->at_s;
@@ -207,6 +231,11 @@ analysis::OrderedJson answer_of(const control::ClosedLoopExperiment& experiment,
       measured.steps.empty() ? analysis::OrderedJson{} : analysis::OrderedJson(measured.position_source);
   answer["predicted_with"] =
       measured.steps.empty() ? analysis::OrderedJson{} : analysis::OrderedJson(measured.predicted_with);
+  const auto checksum_json = [](const std::optional<std::uint32_t>& checksum) {
+    return checksum ? analysis::OrderedJson(*checksum) : analysis::OrderedJson{};
+  };
+  answer["controller_checksum"] = checksum_json(checksum_of(controller.chosen, experiment));
+  answer["run_controller_checksum"] = checksum_json(measured.controller_checksum);
   answer["measured_steps"] = analysis::OrderedJson::array();
   for (const analysis::MeasuredStep& step : measured.steps)
     answer["measured_steps"].push_back(measured_step_json(step));
@@ -239,7 +268,9 @@ void add_options(CLI::App& command, Predict& options) {
 int run(const Predict& options, std::ostream& out) {
   const control::DiscretisationChoice controller = discretised(read(options.controller), options.sampling);
   control::ClosedLoopExperiment experiment = options.experiment;
-  const Measured measured = options.run.run ? follow(options, experiment) : Measured{};
+  Measured measured = options.run.run ? follow(options, experiment) : Measured{};
+  measured.predicted_with +=
+      controllers_in_words(checksum_of(controller.chosen, experiment), measured.controller_checksum);
   experiment.plant = read(options.plant);
   experiment.controller = controller.chosen.sections;
   experiment.period_s = options.sampling.period_s;

@@ -6,11 +6,29 @@
 #include <CLI/CLI.hpp>
 #include <limits>
 #include <stdexcept>
+#include <type_traits>
 
 #include "server/cli/terminal/options.hpp"
 #include "server/storage/query/run_reader.hpp"
+#include "server/storage/runs/run_queries.hpp"
 
 namespace server::cli {
+namespace {
+
+// Reads from the store by `read(database)`.
+template <class Read>
+auto read_from(const RunChoice& choice, Read read) {
+  std::invoke_result_t<Read, SQLite::Database&> value;
+  auto work = [&](SQLite::Database& database, const std::string&) -> Result<void> {
+    value = read(database);
+    return {};
+  };
+  const auto done = storage::read_store(choice.data_dir / "station.sqlite", work);
+  if (!done) throw std::runtime_error{done.error().detail};
+  return value;
+}
+
+}  // namespace
 
 void add_options(CLI::App& command, RunChoice& choice) {
   auto* run = command.add_option("--run", choice.run, "A recorded run by its number");
@@ -28,14 +46,15 @@ std::vector<storage::StoredSample> read_samples(const RunChoice& choice) {
 }
 
 std::optional<storage::StoredReference> read_reference(const RunChoice& choice) {
-  std::optional<storage::StoredReference> stored;
-  auto read = [&](SQLite::Database& database, const std::string&) -> Result<void> {
-    stored = storage::read_reference(database, choice.run.value());
-    return {};
-  };
-  const auto done = storage::read_store(choice.data_dir / "station.sqlite", read);
-  if (!done) throw std::runtime_error{done.error().detail};
-  return stored;
+  const auto read = [&](SQLite::Database& database) { return storage::read_reference(database, choice.run.value()); };
+  return read_from(choice, read);
+}
+
+std::optional<std::uint32_t> read_controller_checksum(const RunChoice& choice) {
+  const auto snapshot = read_from(
+      choice, [&](SQLite::Database& database) { return storage::read_snapshot(database, choice.run.value()); });
+  if (!snapshot || snapshot->controller_checksum == 0) return std::nullopt;
+  return snapshot->controller_checksum;
 }
 
 }  // namespace server::cli

@@ -1,6 +1,7 @@
 // A recorded run as a tool's input: which one, from which station's folder.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <vector>
@@ -23,5 +24,7 @@ void add_options(CLI::App& command, RunChoice& choice);
 // Throws std::runtime_error saying what is wrong; never creates or changes anything.
 std::vector<storage::StoredSample> read_samples(const RunChoice& choice);
 std::optional<storage::StoredReference> read_reference(const RunChoice& choice);  // none: the run has none
+// Of the controller that the robot had when the run began; none: not known.
+std::optional<std::uint32_t> read_controller_checksum(const RunChoice& choice);
 
 }  // namespace server::cli

@@ -10,6 +10,7 @@ using cli::ToolAnswer;
 using ::testing::HasSubstr;
 
 TEST_F(RunTools, PredictRepeatsTheRunsStepAndDisturbance) {
+  robot_.controller_checksum = 0;  // not known
   begin();
   robot_.context.mode = rheonaut_MODE_AUTO;
   robot_.context.setpoint_m = 0.2F;
@@ -35,6 +36,28 @@ TEST_F(RunTools, PredictRepeatsTheRunsStepAndDisturbance) {
   EXPECT_THAT(ask("predict --run 1 --plant newtonian --duty-min 0").text,
               HasSubstr("predicted with: plant newtonian, controller (30) of the paper, duty 0 to 1; if the run had "
                         "others, give --plant and --controller\n\n"));
+}
+
+TEST_F(RunTools, PredictSaysWhetherTheRunBeganWithItsController) {
+  const auto predicted = cli::ask_tool(folder_, "predict --json").json();
+  EXPECT_EQ(predicted["run_controller_checksum"], nullptr) << "there is no run";
+  robot_.controller_checksum = predicted["controller_checksum"].get<std::uint32_t>();
+  begin();
+  robot_.context.mode = rheonaut_MODE_AUTO;
+  robot_.context.setpoint_m = 0.2F;
+  swim(300, 0.3);
+  flush();
+  const auto same = ask("predict --run 1 --json").json();
+  EXPECT_EQ(same["run_controller_checksum"], robot_.controller_checksum);
+  EXPECT_EQ(same["controller_checksum"], robot_.controller_checksum);
+  EXPECT_THAT(same["predicted_with"].get<std::string>(), HasSubstr("; the run began with this controller (checksum "));
+  const auto other = ask("predict --run 1 --duty-min 0 --json").json();
+  EXPECT_EQ(other["run_controller_checksum"], robot_.controller_checksum);
+  EXPECT_NE(other["controller_checksum"], robot_.controller_checksum) << "a motor that turns one way only";
+  EXPECT_THAT(ask("predict --run 1 --duty-min 0").text,
+              HasSubstr(fmt::format("; the run began with ANOTHER controller: its checksum is {:08x}, that of the "
+                                    "prediction {:08x}, so coefficients, period, duty range or derivative differ\n",
+                                    robot_.controller_checksum, other["controller_checksum"].get<std::uint32_t>())));
 }
 
 TEST_F(RunTools, PredictDoesNotCallAPositionKnownWhoseUncertaintyIsNot) {

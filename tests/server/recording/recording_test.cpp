@@ -115,7 +115,7 @@ station::RobotState RecordingTest::state_of(const TestRobot& robot, station::Lin
   state.link = link;
   state.boot_id = robot.boot_id;
   state.firmware_version = "1.2.3";
-  state.controller_checksum = 0xfedcba98;
+  state.controller_checksum = robot.controller_checksum;
   state.context = robot.context;
   state.latest_robot_time_us = robot.time_of(robot.next_seq);
   return state;

@@ -48,6 +48,7 @@ struct TestRobot {
   station::SampleContext context = manual_at_100_hz();
 
   std::uint64_t late_us = 0;  // by periods that it skipped
+  std::uint32_t controller_checksum = 0xfedcba98;
 
   std::uint64_t time_of(std::uint64_t seq) const { return 500'000 + late_us + seq * 10'000; }
   station::SampleBatch batch(std::uint64_t first_seq, std::size_t count) const;
