@@ -127,6 +127,9 @@ const steps = {
     const { runs } = await experiment(id); // a busy browser may miss 400 ms: its step is repeated then
     assert.ok(runs[0].steps.length >= 1);
     await until('its run is done', async () => /Done\s+run \d+/.test(await page.locator('#experiment-runs').innerText()));
+    await page.reload(); // the samples that this page has received are gone
+    await page.locator('#run-plot .track-key.measured').waitFor();
+    await page.locator('#experiment-runs a').waitFor();
     assert.equal(await page.locator('#experiment-runs a').getAttribute('href'), `#/runs/${runs[0].run_id}`);
     await fits('one that is done');
   },

@@ -1,6 +1,6 @@
 // What the page asks the station about experiments, their profiles, and reservations of robots.
 
-import type { Fluid, RunRecord, StoredSample } from './api';
+import type { Fluid, Overview, RunRecord, StoredSample } from './api';
 import type { components } from './api_types';
 import { kOpenStates, type ExperimentSummary } from './experiments_store';
 
@@ -62,9 +62,15 @@ export class ExperimentsApi {
     experiments: async () => (await this.page(robot_id, null)).experiments,
     one: this.one,
     prediction: this.prediction,
-    first_sample: async (run_id: number) =>
-      (await this.ask<{ samples: StoredSample[] }>('GET', `/runs/${run_id}/samples?limit=1`)).samples[0] ?? null,
+    first_sample: this.first_sample,
   });
+  first_sample = async (run_id: number) =>
+    (await this.ask<{ samples: StoredSample[] }>('GET', `/runs/${run_id}/samples?limit=1`)).samples[0] ?? null;
+  // Where the robot believed that it was in a run, from a moment on.
+  estimate_in = (run_id: number, from_us: number, points: number) => {
+    const channels = 'estimated_position_m,position_sd_m';
+    return this.ask<Overview>('GET', `/runs/${run_id}/overview?${query_of({ from_us, points, channels })}`);
+  };
 
   begin = (body: ExperimentBody) => this.ask<Experiment>('POST', '/experiments', body);
   pause = (experiment_id: number) => this.act(experiment_id, 'pause');

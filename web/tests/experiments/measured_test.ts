@@ -1,7 +1,7 @@
 // What a robot believed of its position beside what was predicted: at the same times, and never without its "±".
 import { expect, test } from 'vitest';
 import { SampleRing } from '../../src/samples';
-import { beside, measured_of } from '../../src/views/experiments/measured';
+import { beside, measured_in, measured_of } from '../../src/views/experiments/measured';
 import { batch } from '../fakes';
 
 test('the estimate since the run began, between two standard deviations to either side', () => {
@@ -29,4 +29,22 @@ test('where it is not known how sure the robot was there is no band', () => {
     [null, null],
   ]);
   expect(estimate![1]).toBeCloseTo(0.01, 6);
+});
+
+test('of a run that has ended the record says it: the middle of each point, and its edges two standard deviations away', () => {
+  const overview = {
+    source: 'rows' as const,
+    first_utc_us: [900_000, 1_000_000, 1_100_000, 1_200_000],
+    last_utc_us: [980_000, 1_080_000, 1_180_000, 1_280_000],
+    samples: [9, 9, 9, 9],
+    estimated_position_m: { min: [0, 0.01, 0.02, null], max: [0, 0.03, 0.04, null] },
+    position_sd_m: { min: [0, 0.001, null, null], max: [0, 0.002, null, null] },
+    gaps: [],
+    gaps_next: null,
+  };
+  const [low, high, estimate] = beside(measured_in(overview, 1_040_000), [0, 0.1, 0.2, 0.9]);
+  expect(estimate!.map((m) => m && Math.round(m * 1e4) / 1e4)).toEqual([0.02, 0.03, null, null]);
+  expect(low![0]).toBeCloseTo(0.006, 6);
+  expect(high![0]).toBeCloseTo(0.034, 6);
+  expect([low![1], high![1]], 'how sure the robot was is not known').toEqual([null, null]);
 });

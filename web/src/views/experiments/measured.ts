@@ -1,5 +1,7 @@
 // What the robot has believed of its position since a run began, with its "±", at the times of the run's prediction.
 
+import type { Overview } from '../../api';
+import { kSpread_sd } from '../../format';
 import type { SampleRing } from '../../samples';
 
 export interface Measured {
@@ -22,6 +24,22 @@ export function measured_of(ring: SampleRing, began_s: number, elapsed_s: number
     found.low_m.push(estimate_low_m[slot] ?? NaN);
     found.high_m.push(estimate_high_m[slot] ?? NaN);
   }
+  return found;
+}
+
+// The same of a run that has ended, as it is recorded; `zero_us`: the UTC at which its prediction begins.
+export function measured_in(overview: Overview, zero_us: number): Measured {
+  const { first_utc_us, last_utc_us, estimated_position_m: estimate_m, position_sd_m } = overview;
+  const found: Measured = { t_s: [], position_m: [], low_m: [], high_m: [] };
+  first_utc_us.forEach((first_us, at) => {
+    const least_m = estimate_m?.min[at] ?? NaN;
+    const largest_m = estimate_m?.max[at] ?? NaN;
+    const spread_m = kSpread_sd * (position_sd_m?.max[at] ?? NaN);
+    found.t_s.push(((first_us + (last_utc_us[at] ?? first_us)) / 2 - zero_us) / 1e6);
+    found.position_m.push((least_m + largest_m) / 2);
+    found.low_m.push(least_m - spread_m);
+    found.high_m.push(largest_m + spread_m);
+  });
   return found;
 }
 

@@ -2,7 +2,7 @@
 
 import { useComputed } from '@preact/signals';
 import { useLayoutEffect, useMemo } from 'preact/hooks';
-import type { Experiment, Prediction } from '../../experiments_api';
+import type { Experiment, ExperimentRun, Prediction } from '../../experiments_api';
 import { has_ended, type ExperimentSummary } from '../../experiments_store';
 import { millimetres } from '../../format';
 import { format } from '../../route';
@@ -11,12 +11,14 @@ import type { Session } from '../../session';
 import { useActs, useAsked } from './acts';
 import { ActsOfOne, Presence } from './acts_of_one';
 import { KnowledgePanel } from './knowledge';
-import { measured_of, type Measured } from './measured';
+import { measured_in, measured_of, type Measured } from './measured';
 import type { Track } from './preview';
 import { RunsTable } from './runs_table';
 import { moment_text } from './slot_time';
 import { TrackPlot } from './track_plot';
 import { how_long, kStates, progress_text, sentence_of, situation, who } from './words';
+
+const kMostPoints = 2000; // of a recorded run beside its prediction
 
 export function OneExperiment({ session, id }: { session: Session; id: number }) {
   const { store, experiments } = session;
@@ -190,8 +192,10 @@ function RunPlot({ session, experiment, summary }: RunPlotProps) {
   const answer = asked.answer?.id === id ? asked.answer.prediction : null; // not that of the run before
   const is_now = run !== null && summary.progress?.run === number && run.ended_at_us === null;
   const elapsed_s = is_now ? (summary.progress?.elapsed_s ?? null) : null;
-  const measured = useMeasured(session.store.find(summary.robot_id), elapsed_s);
   const track = useMemo(() => track_of_prediction(answer), [answer]);
+  const live = useMeasured(session.store.find(summary.robot_id), elapsed_s);
+  const recorded = useRecorded(session, run, track?.t_s.length ?? 0);
+  const measured = live ?? recorded;
   if (!run) return null;
   if (answer?.error)
     return (
@@ -233,6 +237,22 @@ function track_of_prediction(prediction: Prediction | null): Track | null {
   if (!prediction?.t_s) return null;
   const { t_s, position_m = [], duty = [], setpoint_m = [], position_sd_m = null } = prediction;
   return { t_s, position_m, duty, setpoint_m, position_sd_m };
+}
+
+// Where the robot believed that it was in a run that has ended: the robot's clock at its first step is when its
+// prediction begins, laid on UTC as the first sample of the run is.
+function useRecorded(session: Session, run: ExperimentRun | null, points: number): Measured | null {
+  const run_id = run !== null && run.ended_at_us !== null && points > 0 ? run.run_id : null;
+  const begun_us = run?.steps[0]?.robot_time_us ?? null;
+  const asked = useAsked<{ run_id: number; measured: Measured } | null>(session, async () => {
+    if (run_id === null || begun_us === null) return null;
+    const first = await session.experiments.first_sample(run_id);
+    if (!first) return null;
+    const zero_us = first.utc_us + begun_us - first.robot_time_us;
+    const overview = await session.experiments.estimate_in(run_id, zero_us, Math.min(points, kMostPoints));
+    return { run_id, measured: measured_in(overview, zero_us) };
+  }, [run_id, begun_us, points]);
+  return asked.answer !== null && asked.answer.run_id === run_id ? asked.answer.measured : null;
 }
 
 // Where the robot believed that it was since the run began, as far as this page has received it.

@@ -29,7 +29,7 @@ const whole_mv = (value: number) => millivolts(value).replace('.0', '');
 const kShown: readonly Shown[] = [
   {
     name: 'position',
-    title: 'Position',
+    title: 'Position, as the controller sees it',
     unit: 'mm',
     channel: 'position_m',
     label: (v) => millimetres(v, 0),
