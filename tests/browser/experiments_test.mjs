@@ -121,16 +121,23 @@ const steps = {
   },
 
   async 'a duty runs through, because the page gives signs of life'() {
-    await paste(profile('Duty', 3, 'duty'));
+    await paste(`${profile('Duty', 3, 'duty')}\n[sweep]\nrepeats = 2\n`);
     const id = await start();
     await shows('done');
     const { runs } = await experiment(id); // a busy browser may miss 400 ms: its step is repeated then
     assert.ok(runs[0].steps.length >= 1);
-    await until('its run is done', async () => /Done\s+run \d+/.test(await page.locator('#experiment-runs').innerText()));
+    await until('its runs are done', async () => /Done\s+run \d+[\s\S]*Done\s+run \d+/.test(await page.locator('#experiment-runs').innerText()));
     await page.reload(); // the samples that this page has received are gone
     await page.locator('#run-plot .track-key.measured').waitFor();
-    await page.locator('#experiment-runs a').waitFor();
-    assert.equal(await page.locator('#experiment-runs a').getAttribute('href'), `#/runs/${runs[0].run_id}`);
+    const records = page.locator('#experiment-runs td a');
+    await records.nth(1).waitFor();
+    assert.equal(await records.first().getAttribute('href'), `#/runs/${runs[0].run_id}`);
+    const plotted = page.locator('#run-plot h2');
+    assert.equal(await plotted.innerText(), 'Run 2');
+    await page.locator('#experiment-runs th a').first().click();
+    await plotted.getByText('Run 1').waitFor();
+    await page.locator('#run-plot .track-key.measured').waitFor();
+    assert.match(page.url(), /#\/experiments\/\d+\?run=1$/);
     await fits('one that is done');
   },
 

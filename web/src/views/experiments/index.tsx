@@ -1,6 +1,7 @@
 // Experiments: what runs and waits, one of them, a new one, and who has which robot when.
 //
-//   #/experiments   #/experiments/3   #/experiments/new?profile=figure_7&robot=sim-1   #/experiments/reservations
+//   #/experiments   #/experiments/3   #/experiments/3?run=2   #/experiments/new?profile=figure_7&robot=sim-1
+//   #/experiments/reservations
 
 import { format } from '../../route';
 import type { ViewProps } from '../table';
@@ -9,6 +10,7 @@ import { OneExperiment } from './one';
 import { Queue } from './queue';
 import { Reservations } from './reservations';
 
+const kNumber = /^[1-9]\d{0,14}$/;
 const kTabs = [
   { part: undefined, id: 'tab-queue', text: 'Queue' },
   { part: 'new', id: 'tab-new', text: 'New experiment' },
@@ -46,7 +48,11 @@ function Part(props: ViewProps) {
   if (part === undefined) return <Queue {...props} />;
   if (part === 'new') return <Begin {...props} />;
   if (part === 'reservations') return <Reservations {...props} />;
-  if (/^[1-9]\d{0,14}$/.test(part)) return <OneExperiment key={part} session={props.session} id={Number(part)} />;
+  if (kNumber.test(part)) {
+    const { run = '' } = props.route.query;
+    const asked_run = kNumber.test(run) ? Number(run) : null;
+    return <OneExperiment key={part} session={props.session} id={Number(part)} asked_run={asked_run} />;
+  }
   return (
     <div class="waiting">
       <h2>Nothing is at this address</h2>

@@ -20,7 +20,13 @@ import { how_long, kStates, progress_text, sentence_of, situation, who } from '.
 
 const kMostPoints = 2000; // of a recorded run beside its prediction
 
-export function OneExperiment({ session, id }: { session: Session; id: number }) {
+interface OneExperimentProps {
+  session: Session;
+  id: number;
+  asked_run: number | null; // the one whose plot was asked for
+}
+
+export function OneExperiment({ session, id, asked_run }: OneExperimentProps) {
   const { store, experiments } = session;
   const known = useComputed(() => store.experiments.find(id)).value;
   // Its runs come with an answer of their own: again whenever /live says that something of them has changed.
@@ -55,6 +61,7 @@ export function OneExperiment({ session, id }: { session: Session; id: number })
       </div>
     );
   }
+  const plotted = whole && plotted_run(whole, asked_run);
   return (
     <div class="one">
       <StopNote session={session} robot_id={summary.robot_id} is_over={has_ended(summary)} />
@@ -62,12 +69,12 @@ export function OneExperiment({ session, id }: { session: Session; id: number })
       {whole && (
         <>
           <div class="one-plot">
-            <RunPlot session={session} experiment={whole} summary={summary} />
+            <RunPlot session={session} experiment={whole} summary={summary} run={plotted} />
             <KnowledgePanel runs={whole.runs} />
           </div>
           <section aria-label="Runs">
             <h2>Runs</h2>
-            <RunsTable session={session} experiment={whole} />
+            <RunsTable session={session} experiment={whole} plotted={plotted?.number ?? null} />
           </section>
           <details class="document">
             <summary>The profile as it is stored</summary>
@@ -174,11 +181,17 @@ interface RunPlotProps {
   session: Session;
   experiment: Experiment;
   summary: ExperimentSummary;
+  run: ExperimentRun | null;
 }
 
-// The run that goes on, or else the last one that has a prediction: predicted, and measured as far as it is recorded.
-function RunPlot({ session, experiment, summary }: RunPlotProps) {
-  const run = experiment.runs.filter((each) => each.has_prediction).at(-1) ?? null;
+// The one that is asked for, or else the run that goes on, or the last one that has a prediction.
+function plotted_run({ runs }: Experiment, asked: number | null): ExperimentRun | null {
+  const predicted = runs.filter((run) => run.has_prediction);
+  return predicted.find((run) => run.number === asked) ?? predicted.at(-1) ?? null;
+}
+
+// Predicted, and measured as far as it is recorded.
+function RunPlot({ session, experiment, summary, run }: RunPlotProps) {
   const number = run?.number ?? 0;
   const id = `${experiment.experiment_id}-${number}`;
   const asked = useAsked<{ id: string; prediction: Prediction | null }>(

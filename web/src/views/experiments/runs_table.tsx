@@ -21,7 +21,13 @@ interface Variant {
   step?: number | null;
 }
 
-export function RunsTable({ session, experiment }: { session: Session; experiment: Experiment }) {
+interface RunsTableProps {
+  session: Session;
+  experiment: Experiment;
+  plotted: number | null; // the run whose plot is shown
+}
+
+export function RunsTable({ session, experiment, plotted }: RunsTableProps) {
   const { runs } = experiment;
   const measured = runs.filter((run) => run.run_id !== null && run.ended_at_us !== null).slice(-kMostMeasured);
   const asked = useAsked(session, async () => {
@@ -49,7 +55,13 @@ export function RunsTable({ session, experiment }: { session: Session; experimen
         </thead>
         <tbody>
           {runs.map((run) => (
-            <Row key={run.number} run={run} metrics={asked.answer?.get(run.number) ?? null} />
+            <Row
+              key={run.number}
+              run={run}
+              metrics={asked.answer?.get(run.number) ?? null}
+              plot={run.has_prediction ? format(plot_of(experiment, run)) : null}
+              is_plotted={run.number === plotted}
+            />
           ))}
         </tbody>
       </table>
@@ -57,7 +69,20 @@ export function RunsTable({ session, experiment }: { session: Session; experimen
   );
 }
 
-function Row({ run, metrics }: { run: ExperimentRun; metrics: Metrics | null }) {
+const plot_of = ({ experiment_id }: Experiment, { number }: ExperimentRun) => ({
+  view: 'experiments',
+  parts: [`${experiment_id}`],
+  query: { run: `${number}` },
+});
+
+interface RowProps {
+  run: ExperimentRun;
+  metrics: Metrics | null;
+  plot: string | null; // the address at which it is shown
+  is_plotted: boolean;
+}
+
+function Row({ run, metrics, plot, is_plotted }: RowProps) {
   const step = metrics?.steps.find((each) => each.cause === 'setpoint') ?? null;
   const figures = metrics?.figures ?? {};
   const figure = (name: string) => (figures as Record<string, number | null | undefined>)[name] ?? null;
@@ -65,7 +90,15 @@ function Row({ run, metrics }: { run: ExperimentRun; metrics: Metrics | null }) 
   const sd_m = figure('position_sd_max_m');
   return (
     <tr>
-      <th scope="row">{run.number}</th>
+      <th scope="row">
+        {plot === null ? (
+          run.number
+        ) : (
+          <a href={plot} aria-label={`plot of run ${run.number}`} aria-current={is_plotted ? 'true' : undefined}>
+            {run.number}
+          </a>
+        )}
+      </th>
       <td>
         <span class={`state ${run.state}`}>{kStates[run.state]}</span>
         {run.reason !== null && <span class="quiet"> {words(run.reason)}</span>}
