@@ -306,7 +306,8 @@ EstimatorModel estimator_model(const FractionalModel& plant) {
     const double error = fit_error_of(found, compared, final_velocity_m_s);
     if (error < model.fit_error) model.sections = found, model.fit_error = error;
   }
-  model.is_met = model.fit_error <= kLargestFitError;
+  // The error is relative to the final velocity: one that no robot reaches hides every other.
+  model.is_met = model.fit_error <= kLargestFitError && std::abs(final_velocity_m_s) <= kLargestParameterM_S;
   if (!model.is_met) model.reason = reason_of(plant, model.fit_error, compared);
   return model;
 }

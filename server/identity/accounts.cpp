@@ -211,7 +211,8 @@ asio::awaitable<Result<User>> Accounts::change_user(std::string name, UserChange
   auto job = [name, change, by](AccountStore& store) { return store.change_user(name, change, by); };
   auto changed = co_await on_store(std::move(job));
   if (!changed) co_return std::unexpected{takes_rights ? not_stored(changed.error()) : changed.error()};
-  users_.insert_or_assign(name, *changed);
+  const auto still = users_.find(name);  // not if it has been removed meanwhile
+  if (still != users_.end()) still->second = *changed;
   if (ends_sessions) sessions_.end_of_user(name);
   renew_standing(name);
   changed_.notify();
@@ -228,6 +229,8 @@ asio::awaitable<Result<void>> Accounts::remove_user(std::string name, station::A
   auto job = [name, by](AccountStore& store) { return store.remove_user(name, by); };
   const auto removed = co_await on_store(std::move(job));
   if (!removed) co_return std::unexpected{not_stored(removed.error())};
+  users_.erase(name);  // one that was added or changed while this waited for the disk
+  sessions_.end_of_user(name);
   co_return Result<void>{};
 }
 

@@ -81,7 +81,7 @@ Result<std::shared_ptr<PendingCommand>> dispatch(StationParts& parts, RobotEntry
   }
   if (auto seen = parts.control.check_sight(request); !seen) return std::unexpected{seen.error()};
   if (auto reached = check_time(*pending, entry.robot); !reached) return std::unexpected{reached.error()};
-  parts.tracker.supersede_queued(entry, *pending);
+  if (is_clear) parts.tracker.supersede_queued(entry, *pending);
   if (!is_clear || !entry.link->send(pending->wire, pending->deadline_us)) {
     return fail(ErrorCode::unavailable, fmt::format("too many commands wait for robot '{}'", request.robot_id),
                 "queue_full");

@@ -65,7 +65,7 @@ std::shared_ptr<PendingCommand> EmergencyStops::make(RobotEntry& entry, const Co
   return stop;
 }
 
-// The stop that answers the request already; null when a new one is needed. SAFETY: only a stop that came with the same
+// SAFETY: only a stop that came with the same
 // key within 10 s and still latches the robot; or the newest, when the robot is away or has as many as it can be given.
 std::shared_ptr<PendingCommand> EmergencyStops::stop_in_force(RobotEntry& entry, const StopRequest& request) {
   if (!request.key.empty()) {

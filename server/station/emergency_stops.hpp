@@ -23,6 +23,8 @@ class EmergencyStops {
   // then. What the link throws reaches the caller; the stop is kept all the same.
   std::shared_ptr<PendingCommand> begin(RobotEntry& entry, const StopRequest& request,
                                         std::vector<CommandRecord>& to_publish);
+  // The stop that answers the request already; null when a new one is needed.
+  std::shared_ptr<PendingCommand> stop_in_force(RobotEntry& entry, const StopRequest& request);
 
   // The robot has connected. SAFETY: a stop that no robot has acknowledged goes first; a robot that `lost_its_latch` in
   // a reset is latched again.
@@ -43,7 +45,6 @@ class EmergencyStops {
   bool may_be_left_out(const RobotEntry& entry) const;
 
  private:
-  std::shared_ptr<PendingCommand> stop_in_force(RobotEntry& entry, const StopRequest& request);
   std::shared_ptr<PendingCommand> make(RobotEntry& entry, const CommandRequest& request);
   void hand(RobotEntry& entry, PendingCommand& stop, std::vector<CommandRecord>& to_publish);
 

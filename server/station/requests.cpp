@@ -40,6 +40,19 @@ void publish_stops(SinkNotifier& notifier, const RobotTable& robots, const std::
   }
 }
 
+// A stop that is answered by one in force makes no new command; who asked for it is recorded all the same.
+// SAFETY: each press holds what waits for the robot, also the press of somebody whose stop is under way already.
+void publish_stop_again(StationParts& parts, const StopRequest& request, const CommandRecord& in_force) {
+  parts.notifier.publish_stop_again(in_force);
+  AuditNote note;
+  note.by = {request.actor, request.peer, parts.clock.utc_us()};
+  note.robot_id = in_force.robot_id;
+  note.action = "command.stop_again";
+  note.subject = std::to_string(in_force.id);
+  note.can_flood = true;
+  parts.notifier.publish(note);
+}
+
 // The robot's answer or, right after the command's time to live, that there was none; with `until_verified` its end.
 asio::awaitable<Result<CommandRecord>> outcome_of(StationParts& parts, std::shared_ptr<PendingCommand> pending,
                                                   bool until_verified) {
@@ -107,8 +120,13 @@ asio::awaitable<Result<CommandRecord>> Station::emergency_stop(StopRequest reque
     co_return std::unexpected{std::move(error)};
   }
   std::shared_ptr<PendingCommand> stop;
-  const auto begin = [&](std::vector<CommandRecord>& made) { stop = parts_->stops.begin(*entry, request, made); };
+  bool is_again = false;
+  const auto begin = [&](std::vector<CommandRecord>& made) {
+    is_again = parts_->stops.stop_in_force(*entry, request) != nullptr;
+    stop = parts_->stops.begin(*entry, request, made);
+  };
   parts_->publish_stops_of(begin, &entry->robot);
+  if (is_again) publish_stop_again(*parts_, request, stop->record);
   const bool is_connected = entry->link != nullptr;
   auto outcome = co_await parts_->tracker.follow(stop, false, patience);
   // The log can wait: it is written once the answer has gone.
@@ -123,6 +141,7 @@ asio::awaitable<StopsOfAll> Station::stop_all(StopRequest request, microseconds 
   const std::int64_t deadline_us = parts_->clock.steady_us() + patience.count();
   std::vector<std::pair<std::shared_ptr<PendingCommand>, bool>> stops;  // and whether the robot is there
   std::vector<CommandRecord> records;  // published once every frame has been handed over
+  std::vector<CommandRecord> again;    // in force already, likewise
   StopsOfAll outcome;
   for (auto& [id, entry] : parts_->robots.entries()) {
     if (parts_->stops.may_be_left_out(entry)) {
@@ -130,6 +149,7 @@ asio::awaitable<StopsOfAll> Station::stop_all(StopRequest request, microseconds 
       continue;
     }
     try {
+      if (const auto same = parts_->stops.stop_in_force(entry, request)) again.push_back(same->record);
       stops.emplace_back(parts_->stops.begin(entry, request, records), entry.link != nullptr);
     } catch (const std::exception& error) {  // SAFETY: the others are stopped all the same
       spdlog::error("emergency stop of robot '{}': {}", id, error.what());
@@ -137,6 +157,13 @@ asio::awaitable<StopsOfAll> Station::stop_all(StopRequest request, microseconds 
     }
   }
   publish_stops(parts_->notifier, parts_->robots, records, outcome.failed);
+  for (const CommandRecord& record : again) {
+    try {
+      publish_stop_again(*parts_, request, record);
+    } catch (const std::exception& error) {
+      spdlog::error("emergency stop of robot '{}' again: {}", record.robot_id, error.what());
+    }
+  }
   spdlog::warn("emergency stop of all {} robots by {}; {} retired ones are not connected and left out", stops.size(),
                request.actor, outcome.left_out.size());
   for (const auto& [stop, is_connected] : stops) {

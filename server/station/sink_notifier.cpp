@@ -15,6 +15,10 @@ void SinkNotifier::publish(const CommandRecord& record) {
   for (StationSink* sink : sinks_) sink->on_command(record);
 }
 
+void SinkNotifier::publish_stop_again(const CommandRecord& in_force) {
+  for (StationSink* sink : sinks_) sink->on_stop_again(in_force);
+}
+
 void SinkNotifier::publish(const AuditNote& audit) {
   for (StationSink* sink : sinks_) sink->on_audit(audit);
 }

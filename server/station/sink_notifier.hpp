@@ -25,6 +25,7 @@ class SinkNotifier {
   void publish(const RobotState& robot, const RobotEvent& event);
   void publish(const RobotState& robot, const ClockRecord& record);
   void publish(const RobotState& robot, const InForceRecord& record);
+  void publish_stop_again(const CommandRecord& in_force);
   void publish_fluid(const RobotState& robot);
   void publish_unusable_samples(const RobotState& robot, std::uint64_t first_seq, std::uint64_t next_seq);
   void publish_unusable_event(const RobotState& robot, std::uint64_t event_seq);

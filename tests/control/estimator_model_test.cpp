@@ -99,6 +99,10 @@ TEST(EstimatorModel, RefusesAGainThatTheRobotsParametersCannotHold) {
   for (const float gain_m_s : bounded.sections.gain_m_s) EXPECT_LE(std::abs(gain_m_s), 10);
   fast.kp = 50 * fast.b3;
   EXPECT_THAT(estimator_model(fast).reason, HasSubstr("final velocity is 50 m/s"));
+  FractionalModel undetermined = kNonNewtonianModel;  // as of a fit that has found an integrator
+  for (double* parameter : {&undetermined.kp, &undetermined.b1, &undetermined.b2}) *parameter *= 1e20;
+  EXPECT_FALSE(estimator_model(undetermined).is_met);
+  EXPECT_THAT(estimator_model(undetermined).reason, HasSubstr("final velocity is"));
 }
 
 TEST(EstimatorModel, RefusesWhatIsNoPlant) {

@@ -156,10 +156,12 @@ Result<void> may_send_now(const http::Request& request, const ParsedCommand& par
   return may_bound_motion(request.caller, parsed, settings);
 }
 
-// The station then knows a command of this id that ended before a restart, or long ago.
+// The station then knows a command of this id that ended before a restart, or long ago. What is not on the disk yet it
+// knows by itself.
+// SAFETY: a disk that fails keeps no command waiting until it is too old to be sent, such as a duty of 0.
 asio::awaitable<void> recall(CommandRoutes parts, station::RobotId robot_id, station::CommandId id) {
   if (parts.station.known_command(robot_id, id) != nullptr) co_return;
-  const auto stored = co_await parts.history.command(id);
+  const auto stored = co_await parts.history.stored_command(id);
   if (stored && stored->ended_at_us != 0) parts.station.remember(*stored);
 }
 
@@ -275,6 +277,10 @@ http::Answer change_control(CommandRoutes parts, http::Request request) {
 // answer, so it is on disk first.
 int stop_status(const station::CommandRecord& record) { return was_accepted(record.state) ? 200 : 202; }
 
+constexpr const char* kStopNotStored =
+    "the stop is kept and goes to the robot before anything else, but the station's disk does not take it: if the "
+    "station ends before it can be stored, it is lost. Keep the station running, make room on its disk, stop again";
+
 // SAFETY: a key that is none does not keep a stop from being carried out.
 station::StopRequest stop_request(const http::Request& request) {
   station::StopRequest stop;
@@ -291,7 +297,8 @@ http::Answer emergency_stop(CommandRoutes parts, http::Request request) {
   const auto record = co_await stop_robot(parts.station, std::move(stop));
   if (!record) co_return http::problem(record.error());
   const int status = stop_status(*record);
-  if (status == 202) co_await parts.history.settle();
+  const bool is_stored = status != 202 || co_await parts.history.settle();
+  if (!is_stored) co_return http::problem(503, kStopNotStored, "not_stored", {{"command", to_json(*record)}});
   co_return http::json_response(status, to_json(*record));
 }
 
@@ -299,7 +306,7 @@ http::Answer emergency_stop_all(CommandRoutes parts, http::Request request) {
   const station::StopsOfAll stops = co_await stop_all_robots(parts.station, stop_request(request));
   int status = 200;
   for (const station::CommandRecord& record : stops.records) status = std::max(status, stop_status(record));
-  if (status == 202) co_await parts.history.settle();
+  const bool is_stored = status != 202 || co_await parts.history.settle();
   nlohmann::ordered_json body;
   body["summary"] = stop_summary(parts.station, stops);  // first, for people who read it
   body["commands"] = list_json("commands", stops.records)["commands"];
@@ -307,6 +314,7 @@ http::Answer emergency_stop_all(CommandRoutes parts, http::Request request) {
     const std::string named = fmt::format("{}", fmt::join(stops.failed | std::views::take(kMaxNamedRobots), ", "));
     co_return http::problem(500, fmt::format("the stop of {} failed; the log says why", named), "internal", json(body));
   }
+  if (!is_stored) co_return http::problem(503, kStopNotStored, "not_stored", json(body));
   co_return http::json_text_response(status, body.dump());
 }
 

@@ -80,6 +80,7 @@ std::string text_in(const json& object, const char* name) {
 std::string refusal_in(const StationAnswer& answer) {
   if (answer.status == 0) return answer.text;
   const std::string detail = answer.body.is_object() ? answer.body.value("detail", std::string{}) : std::string{};
+  if (answer.body.is_object() && answer.body.value("reason", json()) == "not_stored") return detail;
   return fmt::format("the station refused: {}", detail.empty() ? fmt::format("status {}", answer.status) : detail);
 }
 
@@ -115,6 +116,11 @@ std::vector<StopOutcome> stop_all(const StationClient& station) {
   std::vector<StopOutcome> outcomes;
   for (const json& record : answer.body.at("commands"))
     outcomes.push_back(outcome_of(text_in(record, "robot_id"), record));
+  if (answer.body.value("reason", json()) == "not_stored") {
+    for (StopOutcome& one : outcomes) {
+      if (!one.is_confirmed) one.why = refusal_in(answer);
+    }
+  }
   const json summary = answer.body.value("summary", json::object());
   for (const json& one : summary.value("not_acknowledged", json::array())) {
     if (text_in(one, "outcome") != "failed") continue;

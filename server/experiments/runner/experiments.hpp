@@ -81,6 +81,7 @@ class Experiments final : public station::StationSink {
   void on_samples(const station::RobotState& robot, const station::SampleBatch& batch) override;
   void on_robot(const station::RobotState& robot) override;
   void on_command(const station::CommandRecord& record) override;
+  void on_stop_again(const station::CommandRecord& in_force) override;
   bool watches(const station::RobotId& robot_id) const override { return running_.contains(robot_id); }
 
  private:

@@ -25,6 +25,8 @@ class StationSink {
   virtual void on_event_left_out(const RobotState&, std::uint64_t event_seq) { static_cast<void>(event_seq); }
   virtual void on_event(const RobotState&, const RobotEvent&) {}
   virtual void on_command(const CommandRecord&) {}
+  // An emergency stop was asked for whose answer is one that is under way or in force: there is no new command.
+  virtual void on_stop_again(const CommandRecord& in_force) { static_cast<void>(in_force); }
   virtual void on_audit(const AuditNote&) {}
   virtual void on_clock(const RobotState&, const ClockRecord&) {}
   virtual void on_in_force(const RobotState&, const InForceRecord&) {}

@@ -81,7 +81,7 @@ Result<std::vector<RecordedSpan>> read_excerpt(SQLite::Database& database, const
 History::History(std::filesystem::path database, Recorder& recorder, runtime::WorkerThread& readers)
     : recorder_{recorder}, reader_{std::move(database), readers} {}
 
-asio::awaitable<void> History::settle() { co_await recorder_.flush_records(); }
+asio::awaitable<bool> History::settle() { co_return co_await recorder_.flush_records(); }
 
 asio::awaitable<Result<void>> History::store_waiting(std::vector<RecordedSpan> spans) {
   bool is_stored = co_await recorder_.flush_records();
@@ -253,13 +253,17 @@ asio::awaitable<AuditPage> History::audit(AuditFilter filter) {
 }
 
 asio::awaitable<Result<station::CommandRecord>> History::command(station::CommandId id) {
+  co_await recorder_.flush_records();
+  co_return co_await stored_command(id);
+}
+
+asio::awaitable<Result<station::CommandRecord>> History::stored_command(station::CommandId id) {
   auto query = [id](SQLite::Database& database) -> Result<station::CommandRecord> {
     SQLite::Statement row{database, select_commands("WHERE command_id = ?")};
     bind_all(row, id);
     if (!row.executeStep()) return fail(ErrorCode::not_found, fmt::format("there is no command {}", id));
     return command_from(row);
   };
-  co_await recorder_.flush_records();
   co_return co_await reader_.ask(std::move(query));
 }
 

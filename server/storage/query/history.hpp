@@ -103,11 +103,14 @@ class History {
   boost::asio::awaitable<RecordPage<station::RobotEvent>> events(station::RobotId robot_id, RecordFilter filter);
   boost::asio::awaitable<RecordPage<station::CommandRecord>> commands(station::RobotId robot_id, RecordFilter filter);
   boost::asio::awaitable<Result<station::CommandRecord>> command(station::CommandId id);
+  // The same without what waits for the disk: this does not wait for it.
+  boost::asio::awaitable<Result<station::CommandRecord>> stored_command(station::CommandId id);
 
   boost::asio::awaitable<AuditPage> audit(AuditFilter filter);
 
-  // Returns when every command and event that the recorder has received is durable, or after 3 s when the disk fails.
-  boost::asio::awaitable<void> settle();
+  // Returns when every command and event that the recorder has received is durable, or false after 3 s when the disk
+  // fails.
+  boost::asio::awaitable<bool> settle();
   // Returns when all of that and the samples that wait of these spans are durable: for a reader of the database that is
   // another program. unavailable: the disk has not taken them within 3 s.
   boost::asio::awaitable<Result<void>> store_waiting(std::vector<RecordedSpan> spans);

@@ -1,5 +1,6 @@
 // Users, tokens and enrolments: what is kept, what a restart finds, and what a disk that cannot be written spoils.
 #include <fstream>
+#include <future>
 
 #include "server/storage/database/database.hpp"
 #include "tests/server/api/api_fixture.hpp"
@@ -24,11 +25,6 @@ class AccountsTest : public ApiTest {
       all.append(std::istreambuf_iterator<char>{in}, {});
     }
     return all;
-  }
-  SQLite::Database lock_disk() const {  // nobody else writes until it goes
-    SQLite::Database other{recorder.path().string(), SQLite::OPEN_READWRITE};
-    other.exec("BEGIN IMMEDIATE");
-    return other;
   }
 };
 
@@ -113,6 +109,35 @@ TEST_F(AccountsTest, AFailingDiskSignsNobodyOutAndNobodyIn) {
   }
   clock.run_for(6s);
   EXPECT_EQ(stored().sessions().size(), 2U) << "stored as soon as it can be";
+}
+
+TEST_F(AccountsTest, AUserWhoIsRemovedWhileAChangeWaitsForTheDiskDoesNotComeBack) {
+  ASSERT_EQ(make_user("anna"), 201);
+  std::promise<void> gate;
+  const std::shared_future<void> opened = gate.get_future().share();
+  const auto wait = [&]() -> boost::asio::awaitable<void> {
+    auto job = [opened](storage::Database&) { opened.wait(); };
+    co_await recorder.on_disk(std::move(job));
+  };
+  const station::Author by;
+  identity::UserChange to_admin;
+  to_admin.role = identity::Role::admin;
+  const auto change = [&]() -> boost::asio::awaitable<void> {
+    EXPECT_TRUE(co_await api->accounts().change_user("anna", to_admin, by));
+  };
+  const auto remove = [&]() -> boost::asio::awaitable<void> {
+    EXPECT_TRUE(co_await api->accounts().remove_user("anna", by));
+  };
+  tasks.spawn("work before it", wait());
+  tasks.spawn("a change", change());
+  tasks.spawn("a removal", remove());
+  loop.restart();
+  loop.poll();
+  EXPECT_TRUE(api->accounts().users().empty()) << "at once";
+  gate.set_value();
+  clock.settle();
+  EXPECT_TRUE(api->accounts().users().empty());
+  EXPECT_TRUE(stored().users().empty());
 }
 
 TEST_F(AccountsTest, ARobotIsEnrolledRevokedAndEnrolledAgain) {

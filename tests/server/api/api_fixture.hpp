@@ -63,6 +63,12 @@ class ApiTest : public ::testing::Test {
                                                  std::map<std::string, std::string> headers = {});
   Answered end(const std::shared_ptr<std::optional<Answered>>& asked, microseconds limit = 10s);
 
+  SQLite::Database lock_disk() const {  // nobody else writes until it goes
+    SQLite::Database other{recorder.path().string(), SQLite::OPEN_READWRITE};
+    other.exec("BEGIN IMMEDIATE");
+    return other;
+  }
+
   void make_samples(TestRobot& robot, std::uint64_t first_seq, pb_size_t count);
   std::string token() const;
 

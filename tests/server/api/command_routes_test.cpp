@@ -24,6 +24,41 @@ class CommandRoutesTest : public ApiTest {
   }
 };
 
+// SAFETY: a duty of 0 that waits for a disk is too old when it is answered.
+TEST_F(CommandRoutesTest, ADiskThatFailsKeepsNoCommandWithAKeyWaiting) {
+  connect_robot();
+  clock.settle();
+  const SQLite::Database lock = lock_disk();
+  const auto sent = begin_with_key(kCommands, {{"kind", "set_duty"}, {"duty", 0}}, "rest");
+  ASSERT_TRUE(clock.run_until([&] { return robot->commands().size() == 1; }, 100ms));
+  accept(0);
+  EXPECT_EQ(end(sent).status, 200);
+  EXPECT_EQ(end(begin_with_key(kCommands, {{"kind", "set_duty"}, {"duty", 0}}, "rest")).status, 200);
+  EXPECT_EQ(robot->commands().size(), 1U) << "the same command";
+}
+
+// SAFETY: whoever stops a robot that is away must know that a restart would lose the stop.
+TEST_F(CommandRoutesTest, AStopThatIsKeptAndNotStoredIsNotCalledKept) {
+  station::RestoredRobot away;
+  away.id = "away";
+  station.restore({away}, {});
+  const auto stop = [this](const char* target) { return end(begin("POST", target), 20s); };
+  {
+    const SQLite::Database lock = lock_disk();
+    const Answered one = stop("/api/v1/robots/away/emergency-stop");
+    EXPECT_EQ(one.status, 503) << one.body;
+    EXPECT_EQ(one.parsed()["reason"], "not_stored");
+    EXPECT_EQ(one.parsed()["command"]["state"], "queued");
+    EXPECT_TRUE(station.find("away")->pending_stop) << "it is kept all the same";
+    const Answered all = stop("/api/v1/emergency-stop");
+    EXPECT_EQ(all.status, 503) << all.body;
+    EXPECT_EQ(all.parsed()["reason"], "not_stored");
+    EXPECT_EQ(all.parsed()["summary"]["kept"], 1);
+  }
+  EXPECT_EQ(stop("/api/v1/robots/away/emergency-stop").status, 202);
+  EXPECT_EQ(stop("/api/v1/emergency-stop").status, 202);
+}
+
 TEST_F(CommandRoutesTest, ARetriedPostNeverSendsTwice) {
   connect_robot();
   const auto first = begin_with_key(kCommands, duty_, "try-1");
