@@ -43,6 +43,8 @@ void publish_stops(SinkNotifier& notifier, const RobotTable& robots, const std::
 // A stop that is answered by one in force makes no new command; who asked for it is recorded all the same.
 // SAFETY: each press holds what waits for the robot, also the press of somebody whose stop is under way already.
 void publish_stop_again(StationParts& parts, const StopRequest& request, const CommandRecord& in_force) {
+  const CommandId asked = command_id_of(in_force.robot_id, request.actor, request.key);
+  if (!request.key.empty() && asked == in_force.id) return;  // the same press, by another way
   parts.notifier.publish_stop_again(in_force);
   AuditNote note;
   note.by = {request.actor, request.peer, parts.clock.utc_us()};
@@ -141,7 +143,7 @@ asio::awaitable<StopsOfAll> Station::stop_all(StopRequest request, microseconds 
   const std::int64_t deadline_us = parts_->clock.steady_us() + patience.count();
   std::vector<std::pair<std::shared_ptr<PendingCommand>, bool>> stops;  // and whether the robot is there
   std::vector<CommandRecord> records;  // published once every frame has been handed over
-  std::vector<CommandRecord> again;    // in force already, likewise
+  std::vector<CommandRecord> again;    // those in force already, published then, too
   StopsOfAll outcome;
   for (auto& [id, entry] : parts_->robots.entries()) {
     if (parts_->stops.may_be_left_out(entry)) {

@@ -86,8 +86,7 @@ std::string controllers_in_words(std::optional<std::uint32_t> predicted, std::op
   if (*predicted == *of_run) return fmt::format("; the run began with this controller (checksum {:08x})", *of_run);
   return fmt::format(
       "; the run began with ANOTHER controller: its checksum is {:08x}, that of the prediction {:08x}, so "
-      "coefficients, "
-      "period, duty range or derivative differ",
+      "coefficients, period, duty range or derivative differ",
       *of_run, *predicted);
 }
 

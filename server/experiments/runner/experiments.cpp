@@ -356,7 +356,7 @@ void Experiments::on_stop_again(const station::CommandRecord& in_force) { hold_a
 void Experiments::on_command(const station::CommandRecord& record) {
   const bool is_new = record.acknowledged_after_us < 0 && record.ended_at_us == 0;
   if (record.kind == "emergency_stop" && is_new) hold_after_stop(record.robot_id);
-  // SAFETY: whoever resets an emergency may still be at the tube.
+  // SAFETY: somebody who resets an emergency may still be at the tube.
   if (is_new && (disturbance_of(record, "") || record.kind == "clear_emergency")) {
     const bool is_own = record.peer.starts_with("experiment:");
     if (!is_own) commanded_at_us_[record.robot_id] = parts_.clock.steady_us();

@@ -37,7 +37,7 @@ TEST_F(CommandRoutesTest, ADiskThatFailsKeepsNoCommandWithAKeyWaiting) {
   EXPECT_EQ(robot->commands().size(), 1U) << "the same command";
 }
 
-// SAFETY: whoever stops a robot that is away must know that a restart would lose the stop.
+// SAFETY: somebody who stops a robot that is away must know that a restart would lose the stop.
 TEST_F(CommandRoutesTest, AStopThatIsKeptAndNotStoredIsNotCalledKept) {
   station::RestoredRobot away;
   away.id = "away";
@@ -57,6 +57,20 @@ TEST_F(CommandRoutesTest, AStopThatIsKeptAndNotStoredIsNotCalledKept) {
   }
   EXPECT_EQ(stop("/api/v1/robots/away/emergency-stop").status, 202);
   EXPECT_EQ(stop("/api/v1/emergency-stop").status, 202);
+  const auto presses = [this] {
+    return ask("GET", "/api/v1/audit?action=command.stop_again").parsed()["entries"].size();
+  };
+  EXPECT_EQ(presses(), 3U) << "each after the first";
+}
+
+TEST_F(CommandRoutesTest, APressThatComesByTwoWaysIsOnePress) {
+  station::RestoredRobot away;
+  away.id = "away";
+  station.restore({away}, {});
+  for (int way = 0; way < 2; ++way) {
+    EXPECT_EQ(end(begin_with_key("/api/v1/robots/away/emergency-stop", nullptr, "press-1"), 20s).status, 202);
+  }
+  EXPECT_TRUE(ask("GET", "/api/v1/audit?action=command.stop_again").parsed()["entries"].empty());
 }
 
 TEST_F(CommandRoutesTest, ARetriedPostNeverSendsTwice) {
