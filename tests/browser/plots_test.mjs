@@ -230,16 +230,22 @@ const steps = {
 
   async 'a value beyond a threshold is announced until it is acknowledged'() {
     await page.click('#plots-thresholds');
-    await page.fill('input[name=impedance_mv-high]', 'much');
+    const field = page.locator('input[name=impedance_mv-high]');
+    await field.fill('much');
     await page.locator('#threshold-list .failed').waitFor();
-    await page.fill('input[name=impedance_mv-high]', '');
-    await page.locator('input[name=impedance_mv-high]').pressSequentially('10,5');
+    await field.fill('');
+    await field.pressSequentially('10');
+    await page.waitForTimeout(300);
+    assert.equal(await page.locator('#alert-line').count(), 0, 'a number that is still being typed alerts nobody');
+    await field.pressSequentially(',5');
+    await field.press('Enter');
     await page.locator('#alert-line').waitFor();
     assert.match(await text('#alert-line'), /Impedance above 10\.5 mV since/);
     await page.click('#acknowledge-alerts');
     await page.locator('#alert-line').waitFor({ state: 'detached' });
     assert.equal(await page.locator('#numeral-impedance.beyond').count(), 1, 'it is coloured still');
-    await page.fill('input[name=impedance_mv-high]', '');
+    await field.fill('');
+    await field.press('Enter');
     await page.locator('#numeral-impedance.beyond').waitFor({ state: 'detached' });
     await page.click('#plots-thresholds');
   },

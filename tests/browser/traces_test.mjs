@@ -175,6 +175,10 @@ const steps = {
 
   async 'a threshold that is crossed sounds when sounds are on, and is silent when muted'() {
     const tones = () => page.evaluate(() => window.tones ?? 0);
+    const threshold = async (value) => {
+      await page.fill('input[name=impedance_mv-high]', value);
+      await page.press('input[name=impedance_mv-high]', 'Enter');
+    };
     await page.evaluate(() => {
       const start = OscillatorNode.prototype.start;
       OscillatorNode.prototype.start = function (...when) {
@@ -183,30 +187,30 @@ const steps = {
       };
     });
     await page.click('#plots-thresholds');
-    await page.fill('input[name=impedance_mv-high]', '10');
+    await threshold('10');
     await page.locator('#alert-line').waitFor();
     await page.waitForTimeout(300);
     assert.equal(await tones(), 0, 'sounds are off');
     assert.equal(await page.locator('#mute-alerts').count(), 0);
     await page.click('#acknowledge-alerts');
-    await page.fill('input[name=impedance_mv-high]', '');
+    await threshold('');
     await page.click('#show-alarms');
     await page.check('#alert-sound'); // sounds once, so that its loudness is known
     await page.click('#show-alarms');
     await until('the alarm has sounded', async () => (await tones()) === 3);
-    await page.fill('input[name=impedance_mv-high]', '10');
+    await threshold('10');
     await until('the threshold sounds', async () => (await tones()) === 5);
     await page.click('#mute-alerts');
     assert.equal(await text('#mute-alerts'), 'Muted');
     assert.equal(await page.isChecked('#threshold-sound'), false);
     await page.click('#acknowledge-alerts');
-    await page.fill('input[name=impedance_mv-high]', '');
-    await page.fill('input[name=impedance_mv-high]', '11');
+    await threshold('');
+    await threshold('11');
     await page.locator('#alert-line').waitFor();
     await page.waitForTimeout(400);
     assert.equal(await tones(), 5, 'muted');
     await picture('threshold');
-    await page.fill('input[name=impedance_mv-high]', '');
+    await threshold('');
     assert.deepEqual(faults, []);
   },
 };

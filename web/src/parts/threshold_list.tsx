@@ -183,8 +183,11 @@ function ThresholdRow({ channel }: { channel: Channel }) {
         value={drafts[side].value}
         onInput={(event) => {
           const text = (drafts[side].value = event.currentTarget.value);
-          const wanted = parse_threshold(text, per_unit);
-          problem.value = wanted === undefined ? side : '';
+          problem.value = parse_threshold(text, per_unit) === undefined ? side : '';
+        }}
+        // With Enter, or when the field is left: the 1 of 12 alerts nobody.
+        onChange={(event) => {
+          const wanted = parse_threshold(event.currentTarget.value, per_unit);
           if (wanted !== undefined) thresholds.set(channel, { ...range, [side]: wanted });
         }}
       />
