@@ -150,11 +150,16 @@ std::string Accounts::open_session(const std::string& user, const std::string& p
   return secret;
 }
 
-bool Accounts::end_session(std::uint64_t number, const station::Author& by) {
-  const bool ended = sessions_.end(number);
+asio::awaitable<Result<void>> Accounts::end_session(std::uint64_t number, station::Author by) {
+  if (!sessions_.end(number)) co_return fail(ErrorCode::not_found, "there is no such session", "unknown_session");
+  note(std::move(by), "account.session_ended", std::to_string(number), "{}", false);
+  const bool saved = co_await save();
+  if (saved) co_return Result<void>{};
   changed_.notify();
-  if (ended) note(by, "account.session_ended", std::to_string(number), "{}", false);
-  return ended;
+  co_return fail(ErrorCode::unavailable,
+                 "the session has ended, and the station's disk cannot store that now; its log says why. The station "
+                 "tries again every 5 s; a restart before that would bring the session back",
+                 "not_stored");
 }
 
 void Accounts::on_refused_sign_in(const std::string& user, const std::string& peer, const char* reason) {

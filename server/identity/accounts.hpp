@@ -54,7 +54,8 @@ class Accounts {
 
   // The secret of a new session, for its cookie.
   std::string open_session(const std::string& user, const std::string& peer, const std::string& agent);
-  bool end_session(std::uint64_t number, const station::Author& by);
+  // It has ended in any case. unavailable: the disk cannot store that now. not_found: there is no such session.
+  boost::asio::awaitable<Result<void>> end_session(std::uint64_t number, station::Author by);
   // The audit has the name of a user that exists; another name may be a password typed in the wrong field.
   void on_refused_sign_in(const std::string& user, const std::string& peer, const char* reason);
   const std::list<Sessions::Open>& sessions() const { return sessions_.all(); }

@@ -110,8 +110,12 @@ void CommandTracker::on_answer(RobotEntry& entry, PendingCommand& pending, const
   const CommandId id = pending.record.id;
   switch (ack.result) {
     case rheonaut_COMMAND_RESULT_ACCEPTED: return acknowledge(entry, id, "");
-    // It was sent before, by a station that has restarted since: the client's key has made it the same command.
-    case rheonaut_COMMAND_RESULT_DUPLICATE: return acknowledge(entry, id, "duplicate");
+    // It was sent before, by a station that was killed before it stored that: the client's key has made it the same
+    // command. A robot answers so as well when it had refused it, and says no more unless it gives the time of its
+    // effect.
+    case rheonaut_COMMAND_RESULT_DUPLICATE:
+      if (ack.effect_at_robot_us == 0) return end_without_answer(entry, id, "duplicate");
+      return acknowledge(entry, id, "duplicate");
     case rheonaut_COMMAND_RESULT_EXPIRED: return finish(entry, id, CommandState::expired, pending.expiry());
     case rheonaut_COMMAND_RESULT_REJECTED: return finish(entry, id, CommandState::rejected, text_or_number(ack.reason));
     default: return finish(entry, id, CommandState::rejected, text_or_number(ack.result));
@@ -288,7 +292,7 @@ void CommandTracker::end_unanswered(RobotEntry& entry, CommandId id, const char*
   finish(entry, id, queued_state, queued_reason);
 }
 
-// A command that was sent, when no answer is to be expected any more.
+// A command that was sent, when no answer that says what became of it is to be expected any more.
 void CommandTracker::end_without_answer(RobotEntry& entry, CommandId id, const char* reason) {
   const auto pending = entry.commands.find_unanswered(id);
   if (pending->seen_after_us >= 0) {

@@ -30,6 +30,7 @@ export const kReasons: Record<string, string> = {
   stale: 'What this page showed was too old. Look again.',
   timed_out: 'The robot did not answer in time.',
   no_answer: 'The robot did not answer in time. Whether it has obeyed is not known yet.',
+  duplicate: 'The robot has had it before. Whether it has obeyed is not known yet.',
   not_sent_in_time: 'It could not be sent in time and was discarded.',
   unknown_robot: 'The station does not know this robot.',
   link_lost: 'The link to the robot broke before it answered. Whether it has obeyed is not known yet.',

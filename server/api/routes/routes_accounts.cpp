@@ -51,8 +51,8 @@ http::Answer log_out(AccountRoutes parts, http::Request request) {
   if (request.caller.session == 0) {
     co_return http::problem(409, "a token has no session; revoke the token instead", "no_session");
   }
-  parts.accounts.end_session(request.caller.session, author_of(request, parts.clock));
-  http::Response response = http::json_response(200, json::object());
+  const auto ended = co_await parts.accounts.end_session(request.caller.session, author_of(request, parts.clock));
+  http::Response response = ended ? http::json_response(200, json::object()) : http::problem(ended.error());
   response.headers.emplace_back("Set-Cookie", parts.auth.cookie("", parts.facts.is_secure()));
   co_return response;
 }
@@ -180,10 +180,9 @@ http::Answer list_sessions(AccountRoutes parts, http::Request request) {
 
 http::Answer revoke_session(AccountRoutes parts, http::Request request) {
   const auto number = parse_id(request.param.at("session"));
-  if (!number || !parts.accounts.end_session(*number, author_of(request, parts.clock))) {
-    co_return http::problem(404, "there is no such session", "unknown_session");
-  }
-  co_return http::json_response(200, json::object());
+  if (!number) co_return http::problem(404, "there is no such session", "unknown_session");
+  const auto ended = co_await parts.accounts.end_session(*number, author_of(request, parts.clock));
+  co_return ended ? http::json_response(200, json::object()) : http::problem(ended.error());
 }
 
 // ---- robots

@@ -40,11 +40,14 @@ http::Response command_response(const station::CommandRecord& record) {
       return http::problem({ErrorCode::timed_out, fmt::format("{} expired before it took effect", record.kind),
                             record.reason.empty() ? "expired" : record.reason},
                            with_command);
-    case station::CommandState::unknown:
+    case station::CommandState::unknown: {
+      const char* what = record.reason == "duplicate" ? "the robot has had this {} before, and says no more of it"
+                                                      : "the robot did not answer {}";
       return http::problem(
-          {ErrorCode::timed_out,
-           fmt::format("the robot did not answer {}; whether it has run is not known yet", record.kind), record.reason},
+          {ErrorCode::timed_out, fmt::format(fmt::runtime(what), record.kind) + "; whether it has run is not known yet",
+           record.reason},
           with_command);
+    }
     case station::CommandState::queued:
     case station::CommandState::sent: break;
   }

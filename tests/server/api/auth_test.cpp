@@ -117,7 +117,9 @@ TEST_F(AuthTest, ASessionOutlivesTheStationAndItsNumberIsNotGivenTwice) {
   auto* first = start();
   const std::string session = first->log_in();
   const std::string other = first->log_in();
-  first->accounts.end_session(2, {});
+  const station::Author by;
+  const auto end_second = [&]() -> boost::asio::awaitable<void> { co_await first->accounts.end_session(2, by); };
+  tasks.spawn("the end of a session", end_second());
   store(first);
   auto* second = start();
   EXPECT_EQ(second->actor(session), "session:1");

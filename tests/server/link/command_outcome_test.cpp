@@ -208,17 +208,59 @@ TEST_F(CommandOutcomeTest, ARequestThatComesAgainUnderItsKeyIsNotSentAgain) {
 }
 
 // A station that restarted has forgotten, and the robot has not.
-TEST_F(CommandOutcomeTest, WhatTheRobotHasHadBeforeIsAcknowledged) {
-  auto* robot = connect();
-  station::CommandRequest request = request_of(set_duty(0.3F));
-  request.key = "try-1";
-  submit(request);
+class SentBeforeTest : public CommandOutcomeTest {
+ protected:
+  // A request with a key that the robot has had before, from a station that was killed.
+  void answer_duplicate(std::uint64_t effect_at_robot_us = 0) {
+    robot = connect();
+    station::CommandRequest request = request_of(set_duty(0.3F));
+    request.key = "try-1";
+    submit(request);
+    clock.settle();
+    EXPECT_EQ(robot->commands().at(0).command_id, station::command_id_of("r1", "test", "try-1"));
+    protocol::RobotFrame answer = rheonaut_RobotFrame_init_zero;
+    answer.which_body = rheonaut_RobotFrame_command_ack_tag;
+    answer.body.command_ack.command_id = robot->commands()[0].command_id;
+    answer.body.command_ack.result = rheonaut_COMMAND_RESULT_DUPLICATE;
+    answer.body.command_ack.effect_at_robot_us = effect_at_robot_us;
+    robot->send(answer);
+    clock.settle();
+    ASSERT_EQ(results.size(), 1U);
+  }
+  std::string end() const {
+    const auto record = latest(results.at(0)->id);
+    return std::string{station::text(record.state)} + ' ' + record.reason;
+  }
+
+  TestRobot* robot = nullptr;
+};
+
+// The robot answers the same when it had refused it.
+TEST_F(SentBeforeTest, IsUnknownUntilTelemetryShowsIt) {
+  answer_duplicate();
+  EXPECT_EQ(end(), "unknown duplicate");
+  show_duty(*robot, 0, robot->robot_now_us());
+  EXPECT_EQ(end(), "unknown duplicate");
+  clock.run_for(10ms);
+  show_duty(*robot, 0.3F, robot->robot_now_us());
+  EXPECT_EQ(end(), "verified duplicate");
+}
+
+TEST_F(SentBeforeTest, IsAcknowledgedOnceAnEventNamesIt) {
+  answer_duplicate();
+  protocol::RobotFrame frame = rheonaut_RobotFrame_init_zero;
+  frame.which_body = rheonaut_RobotFrame_event_tag;
+  frame.body.event.command_id = robot->commands()[0].command_id;
+  frame.body.event.kind = rheonaut_EVENT_KIND_MODE_CHANGED;
+  frame.body.event.event_robot_time_us = robot->robot_now_us();
+  robot->send(frame);
   clock.settle();
-  EXPECT_EQ(robot->commands().at(0).command_id, station::command_id_of("r1", "test", "try-1"));
-  robot->acknowledge(robot->commands()[0], rheonaut_COMMAND_RESULT_DUPLICATE);
-  clock.settle();
-  EXPECT_EQ(results.at(0)->state, station::CommandState::acknowledged);
-  EXPECT_EQ(results[0]->reason, "duplicate");
+  EXPECT_EQ(end(), "acknowledged named_by_event");
+}
+
+TEST_F(SentBeforeTest, IsAcknowledgedWhenTheRobotGivesTheTimeOfItsEffect) {
+  answer_duplicate(1'000);
+  EXPECT_EQ(end(), "acknowledged duplicate");
 }
 
 }  // namespace

@@ -259,7 +259,7 @@ TEST_F(ReadBackTest, AfterTwoControllersInOneBurstItIsNotKnownWhatARestoreBrings
   EXPECT_FALSE(former());
 }
 
-TEST_F(ReadBackTest, WhatTheRobotHasAnsweredBeforeIsNotWaitedFor) {
+TEST_F(ReadBackTest, WhatTheRobotHasHadBeforeIsNotWaitedFor) {
   station::CommandRequest request = request_of(set_controller(controller(7)));
   request.until_verified = true;
   submit(std::move(request));
@@ -271,7 +271,7 @@ TEST_F(ReadBackTest, WhatTheRobotHasAnsweredBeforeIsNotWaitedFor) {
   robot->send(answer);
   clock.settle();
   ASSERT_EQ(results.size(), 1U);
-  EXPECT_EQ(end(), "acknowledged duplicate");
+  EXPECT_EQ(end(), "unknown duplicate");
 }
 
 TEST_F(ReadBackTest, ARestoreOfWhatTheStationHasNotSeenIsVerifiedByTheControllerThatIsReportedAfterIt) {

@@ -161,7 +161,7 @@ TEST_F(MigrationTest, ToolsReadVersion1WithoutChangingIt) {
   EXPECT_EQ(number("PRAGMA user_version"), 1);
 }
 
-TEST_F(MigrationTest, TheNewViewsAndTheLatchAreAnsweredByIndex) {
+TEST_F(MigrationTest, WhatIsAskedOftenIsAnsweredByIndex) {
   {
     const storage::Database database{path_};
   }
@@ -173,6 +173,9 @@ TEST_F(MigrationTest, TheNewViewsAndTheLatchAreAnsweredByIndex) {
             (std::vector<std::string>{"SEARCH run_span USING PRIMARY KEY (run_id=?)",
                                       "SEARCH boot USING INTEGER PRIMARY KEY (rowid=?)",
                                       "SEARCH marker USING INDEX marker_by_seq (boot_key=? AND seq>? AND seq<?)"}));
+  EXPECT_EQ(plan("SELECT 1 FROM run WHERE robot_id = 'nemo' AND state <> 'discarded' AND started_at_us <= 5"
+                 " AND coalesce(ended_at_us, 9) >= 5"),
+            std::vector<std::string>{"SEARCH run USING INDEX run_by_robot (robot_id=? AND started_at_us<?)"});
 }
 
 // What was in force at a span's first sample counts, and what came into force within it; nothing before or after.
