@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <cerrno>
 #include <iostream>
 #include <memory>
 #include <set>
@@ -21,7 +22,12 @@
 namespace server::cli {
 namespace {
 
-constexpr const char* kNotWritten = "the answer could not be written; is the disk full?";
+// Who reads a pipe (`| head`) may have read enough; anything else that takes no text is a fault.
+// errno was 0 before the answer.
+void end_answer(std::ostream& out) {
+  if (out.flush() || errno == EPIPE) return;
+  throw std::runtime_error{"the answer could not be written; is the disk full?"};
+}
 
 void add_options(CLI::App& command, config::ConfigFlags& flags) {
   const auto add = [&command](const char* name, auto& value, const char* meaning) {
@@ -134,11 +140,12 @@ void define_command_line(CLI::App& app, CommandLine& line) {
   offer<LoginLink>(app, "login-link", "Make a one-time link that signs a browser in", line);
   offer<UserCommand>(app, "user", "Users of a station: add, list, change, remove", line);
   offer<TokenCommand>(app, "token", "API tokens of a station: create, list, revoke", line);
-  offer<RobotCommand>(app, "robot", "Robots of a station: enrol, list, revoke", line);
+  offer<RobotCommand>(app, "robot",
+                      "Robots of a station: enrol, list, revoke, parameters, controller, fluid, reserve, …", line);
   offer<Commission>(*app.get_subcommand("robot"), "commission",
                     "The first hour with a robot: prove its stops, measure it, write a signed record", line);
   offer<FluidCommand>(app, "fluid", "Fluids of a station and their models: list, model, remove-model", line);
-  offer<JobCommand>(app, "job", "Computations of a station on its runs: begin, list, show, cancel", line);
+  offer<JobCommand>(app, "job", "Computations of a station on its runs: begin, list, show, file, cancel", line);
   offer<DesignCommand>(app, "design", "Models and controllers that a station keeps: list, save, show, export, compare",
                        line);
   offer<MetricsQuestion>(app, "metrics", "Figures and steps of a run; several runs side by side, with their spread",
@@ -158,8 +165,8 @@ void define_command_line(CLI::App& app, CommandLine& line) {
   offer<Discretise>(app, "discretise", "Turn the controller into coefficients for the robot", line);
   offer<Export>(app, "export", "Write a recorded run as a file: CSV, MAT, SQLite or MCAP", line);
   offer<RunCommand>(app, "run", "Make a run final whose robot does not come back", line);
-  offer<ReferenceCommand>(app, "reference", "A run's position as it was measured from outside: import, show, remove",
-                          line);
+  offer<ReferenceCommand>(app, "reference",
+                          "A run's position as it was measured from outside: import, show, export, remove", line);
   offer<Predict>(app, "predict", "Predict a closed-loop experiment, beside a recorded one", line);
   offer<ProfileQuestion>(app, "profile", "List experiment profiles; check one and predict its runs", line);
   offer<ExperimentCommand>(
@@ -182,11 +189,12 @@ CommandLine parse_command_line(int argc, char** argv) {
   CLI::App app;
   CommandLine line;
   define_command_line(app, line);
+  errno = 0;
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     const Answered answered{base::command_line::answer(app, error)};
-    if (!std::cout.flush()) throw std::runtime_error{kNotWritten};
+    end_answer(std::cout);
     return answered;
   }
   return line;
@@ -210,8 +218,9 @@ std::optional<int> answer(const CommandLine& line, std::ostream& out) {
             fmt::print(stderr, "rheonaut: {}\n", one_line(error.what()));
             return base::command_line::kUsageError;
           }
-          out << text.view() << std::flush;
-          if (!out) throw std::runtime_error{kNotWritten};
+          errno = 0;
+          out << text.view();
+          end_answer(out);
           return exit_code;
         }
       },

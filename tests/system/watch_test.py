@@ -31,6 +31,9 @@ class WatchTest(unittest.TestCase):
             fresh = wait_until(lambda: re.search(r"(?m)^sim-1 +manual +-?\d+\.\d ± \d+\.\d +-?\d+ % +0\.\d s",
                                                  self.watch(place, "--once").stdout), 60, "fresh values")
             self.assertNotIn("\x1b", fresh.string)
+            other = self.watch(place, "sim-1", "nobody", "--once")
+            self.assertEqual((other.returncode, other.stdout), (1, ""))
+            self.assertIn("the station knows no robot 'nobody'", other.stderr)
             line = json.loads(self.watch(place, "sim-1", "--once", "--json").stdout)
             self.assertEqual(line["robot_id"], "sim-1")
             self.assertGreater(line["position_sd_m"], 0)

@@ -103,7 +103,7 @@ Result<void> read_set_parameter(const Members& body, protocol::Command& action) 
   }
   if (body.has("confirm") && body.object().at("confirm") == json(true)) return {};
   return fail(ErrorCode::invalid,
-              fmt::format("the parameter {} bounds motion; send \"confirm\": true to change it all the same", *name),
+              fmt::format("the parameter {} bounds motion; to change it, add \"confirm\": true (--confirm)", *name),
               "confirm_required");
 }
 

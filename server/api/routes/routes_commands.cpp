@@ -149,7 +149,7 @@ Result<void> may_bound_motion(const identity::Caller& caller, const ParsedComman
     return fail(ErrorCode::forbidden, what + "; to change it needs the role admin", "not_permitted");
   }
   if (command.is_confirmed) return {};
-  return fail(ErrorCode::invalid, what + "; send \"confirm\": true to change it all the same", "confirm_required");
+  return fail(ErrorCode::invalid, what + "; to change it, add \"confirm\": true (--confirm)", "confirm_required");
 }
 
 // What the caller may not send now. It is judged when nothing is waited for any more.

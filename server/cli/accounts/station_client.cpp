@@ -48,6 +48,11 @@ std::string token_of(const std::filesystem::path& file) {
     throw std::runtime_error{
         fmt::format("there is no folder '{}'; --data names that of a station", file.parent_path().string())};
   }
+  if (!std::filesystem::exists(file)) {
+    throw std::runtime_error{
+        fmt::format("'{}' is no station's data folder, or its station has never run: there is no rheonaut.token in it",
+                    file.parent_path().string())};
+  }
   const std::string token = runtime::read_private(file).value_or("");
   const std::string line = token.substr(0, token.find('\n'));
   if (line.empty()) throw std::runtime_error{fmt::format("cannot read the station's token in '{}'", file.string())};

@@ -10,6 +10,7 @@
 #include <limits>
 
 #include "server/cli/experiments/autotune_comparison.hpp"
+#include "server/cli/experiments/profile_file.hpp"
 #include "server/cli/terminal/options.hpp"
 #include "server/cli/terminal/output.hpp"
 #include "server/experiments/three_tones_document.hpp"
@@ -24,22 +25,13 @@ namespace {
 constexpr const char* kIdentificationSet = "identification_set";
 constexpr double kSecondPrbsFrom_s = 129;
 
-json profile_in(const std::string& name) {
-  if (!name.ends_with(".json")) return name;
-  std::ifstream in{name};
-  if (!in) throw std::runtime_error{fmt::format("cannot read '{}'", name)};
-  json document = json::parse(in, nullptr, false);
-  if (document.is_object()) return document;
-  throw std::runtime_error{fmt::format("'{}' is not a profile as a JSON object", name)};
-}
-
 AutotuneRequest request_of(const Autotune& options) {
   AutotuneRequest request = options.request;
-  request.profile = profile_in(options.profile);
+  request.profile = profile_document(options.profile);
   if (request.is_model_free && options.profile == kIdentificationSet) {
     request.profile = experiments::three_tones_document(request.crossover_rad_s, options.tone_amplitude_m);
   }
-  request.verify_profile = profile_in(options.verify_profile);
+  request.verify_profile = profile_document(options.verify_profile);
   const bool is_shipped_set = !request.run && !request.is_model_free && options.profile == kIdentificationSet;
   if (is_shipped_set && !request.fit_to_s && !request.validation_from_s) {
     request.fit_to_s = request.validation_from_s = kSecondPrbsFrom_s;
@@ -91,7 +83,7 @@ void write_end(const Autotune& options, const AutotuneState& state, const Autotu
 void add_experiments(CLI::App& command, Autotune& options) {
   auto* profile = command
                       .add_option("--profile", options.profile,
-                                  "Of the identification: a shipped profile, or a .json file (default: "
+                                  "Of the identification: a shipped profile, or a file in TOML or JSON (default: "
                                   "identification_set)")
                       ->check(named());
   command.add_option("--run", options.request.run, "Instead of an experiment, this recorded run")
@@ -111,7 +103,7 @@ void add_experiments(CLI::App& command, Autotune& options) {
   for (const char* of_a_model : {"--fit-to-s", "--validation-from-s"}) model_free->excludes(of_a_model);
   command
       .add_option("--verify-profile", options.verify_profile,
-                  "Of the closed loop: a shipped profile, or a .json file (default: figure_7)")
+                  "Of the closed loop: a shipped profile, or a file in TOML or JSON (default: figure_7)")
       ->check(named());
 }
 

@@ -20,7 +20,7 @@ inline constexpr int kNothingMeetsIt = 3, kStageEnded = 5;
 struct Autotune {
   std::filesystem::path data_dir = "rheonaut-data";
   AutotuneRequest request;
-  std::string profile = "identification_set", verify_profile = "figure_7";  // names, or files of documents in JSON
+  std::string profile = "identification_set", verify_profile = "figure_7";  // names, or files in TOML or JSON
   double tone_amplitude_m = 0.02;                                           // of a model-free identification
   std::optional<std::filesystem::path> resume;
   bool json = false;

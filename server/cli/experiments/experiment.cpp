@@ -17,6 +17,7 @@
 
 #include "server/cli/accounts/account_access.hpp"
 #include "server/cli/accounts/station_client.hpp"
+#include "server/cli/experiments/profile_file.hpp"
 #include "server/cli/terminal/options.hpp"
 #include "server/cli/terminal/output.hpp"
 
@@ -51,15 +52,6 @@ json ask_experiments(const StationClient& station, const std::string& method, co
   const StationAnswer answer = station.ask(method, target, body);
   if (answer.status >= 200 && answer.status < 300) return answer.body;
   throw std::runtime_error{fmt::format("the station refused: {}", answer.body.value("detail", "no reason"))};
-}
-
-// A file is sent as it is; anything else is the name of a profile that comes with the program.
-std::string profile_document(const std::string& name_or_file) {
-  if (!std::filesystem::is_regular_file(name_or_file)) return name_or_file;
-  std::ifstream file{name_or_file, std::ios::binary};
-  std::ostringstream text;
-  if (!(file && text << file.rdbuf())) throw std::runtime_error{fmt::format("cannot read '{}'", name_or_file)};
-  return text.str() + "\n";
 }
 
 std::string text_of(const json& value) { return value.is_null() ? "" : value.get<std::string>(); }

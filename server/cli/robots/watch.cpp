@@ -81,6 +81,16 @@ std::string cut(const std::string& text, std::size_t columns) {
   return text.substr(0, i);
 }
 
+// Those of the names that the station knows no robot of; empty: it knows all.
+std::string unknown_of(const json& robots, const std::vector<std::string>& names) {
+  std::vector<std::string> unknown;
+  for (const std::string& name : names) {
+    const auto is_it = [&name](const json& robot) { return robot.at("robot_id") == name; };
+    if (std::ranges::none_of(robots, is_it)) unknown.push_back("'" + one_line(name) + "'");
+  }
+  return unknown.empty() ? "" : fmt::format("the station knows no robot {}", fmt::join(unknown, ", "));
+}
+
 json chosen_of(const json& robots, const std::vector<std::string>& names) {
   json chosen = json::array();
   for (const json& robot : robots) {
@@ -168,7 +178,9 @@ class Watch {
       const StationClient station{options_.data_dir};  // anew: it may have been started on another port
       StationAnswer answer = station.ask_at_once({{"GET", "/api/v1/robots"}}, kWatchPatience).front();
       if (answer.status == 0) throw std::runtime_error{answer.text};
-      robots_ = chosen_of(asked(std::move(answer)).at("robots"), options_.robots);
+      const json robots = asked(std::move(answer)).at("robots");
+      robots_ = chosen_of(robots, options_.robots);
+      unknown_ = unknown_of(robots, options_.robots);
       problem_.clear();
     } catch (const std::exception& error) {
       problem_ = error.what();
@@ -176,6 +188,7 @@ class Watch {
     return problem_.empty();
   }
   const std::string& problem() const { return problem_; }
+  const std::string& unknown() const { return unknown_; }  // what of the names it knows no robot of
 
   std::string plain() const {
     if (options_.form.is_json) return problem_.empty() ? json_lines(robots_, clock_.utc_us()) : "";
@@ -189,7 +202,8 @@ class Watch {
     const Size size = terminal_size();
     std::vector<std::string> lines = watch_lines(robots_, clock_.utc_us(), size.columns, has_colours());
     if (lines.size() + 1 > size.rows) lines.resize(std::max<std::size_t>(size.rows, 2) - 1);
-    lines.push_back(cut(problem_.empty() ? "q or Ctrl-C: end" : "NO ANSWER: " + one_line(problem_), size.columns));
+    const std::string now = unknown_.empty() ? "q or Ctrl-C: end" : unknown_ + "; q or Ctrl-C: end";
+    lines.push_back(cut(problem_.empty() ? now : "NO ANSWER: " + one_line(problem_), size.columns));
     std::string text = "\x1b[H";
     for (std::size_t i = 0; i < lines.size(); ++i) text += (i == 0 ? "" : "\r\n") + lines[i] + "\x1b[K";
     return text + "\x1b[J";
@@ -201,6 +215,7 @@ class Watch {
   runtime::SystemClock clock_{loop_};
   json robots_ = json::array();
   std::string problem_;
+  std::string unknown_;
 };
 
 int watch_on(const WatchCommand& options) {
@@ -268,6 +283,7 @@ int run(const WatchCommand& options, std::ostream& out) {
   if (!options.is_once) return watch_on(options);
   Watch watch{options};
   if (!watch.look()) throw std::runtime_error{watch.problem()};
+  if (!watch.unknown().empty()) throw std::runtime_error{watch.unknown()};
   out << watch.plain();
   return 0;
 }

@@ -1,5 +1,5 @@
 PRAGMA application_id = 1382573423;
-PRAGMA user_version = 10;
+PRAGMA user_version = 11;
 BEGIN;
 CREATE TABLE api_token (
   name TEXT PRIMARY KEY,
@@ -1187,4 +1187,5 @@ SELECT printf('%llu', command_id) AS command_id, robot_id, printf('%llu', boot_i
   further_renewals, last_renewed_at_us
 FROM command;
 CREATE INDEX run_span_by_boot ON run_span(boot_key);
+CREATE INDEX run_by_robot ON run(robot_id, started_at_us);
 COMMIT;

@@ -352,10 +352,17 @@ TEST_F(AutotuneTest, AProfileMayBeADocument) {
   save("mine.json", R"({"name":"mine","step":[{"kind":"rest","for_s":3}]})");
   options.profile = (folder_ / "mine.json").string();
   ASSERT_EQ(tune(), 0);
-  EXPECT_EQ(station.body_of(kExperiments)["profile"]["name"], "mine");
+  EXPECT_THAT(station.body_of(kExperiments)["profile"].get<std::string>(), HasSubstr(R"("name":"mine")"));
   EXPECT_FALSE(station.body_of(kJobs).contains("to_s")) << "the halves of the shipped set are not those of any profile";
   options.profile = (folder_ / "none.json").string();
   EXPECT_THROW(tune(), std::runtime_error);
+}
+
+TEST_F(AutotuneTest, AProfileMayBeAFileInToml) {
+  save("mine.toml", "version = 1\nname = \"mine\"\n");
+  options.profile = (folder_ / "mine.toml").string();
+  ASSERT_EQ(tune(), 0);
+  EXPECT_EQ(station.body_of(kExperiments)["profile"], "version = 1\nname = \"mine\"\n\n");
 }
 
 TEST_F(ToolTest, AutotuneRefusesBadOptions) {

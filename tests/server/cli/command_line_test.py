@@ -160,6 +160,21 @@ class CommandLineTest(unittest.TestCase):
             self.assertEqual(done.returncode, 1)
             self.assertIn(f"no station runs in '{folder}'", done.stderr)
 
+    def test_a_reader_who_has_read_enough_is_no_fault_and_a_full_disk_is(self):
+        for words in (["--help"], ["profile"], ["man"]):
+            with self.subTest(words=words):
+                reader, writer = os.pipe()
+                os.close(reader)
+                with os.fdopen(writer, "w") as pipe:
+                    done = subprocess.run([str(BIN / "rheonaut"), *words], stdout=pipe, stderr=subprocess.PIPE, text=True,
+                                          timeout=120)
+                self.assertEqual((done.returncode, done.stderr), (0, ""))
+                with open("/dev/full", "w", encoding="utf-8") as full:
+                    done = subprocess.run([str(BIN / "rheonaut"), *words], stdout=full, stderr=subprocess.PIPE, text=True,
+                                          timeout=120)
+                self.assertEqual(done.returncode, 1)
+                self.assertIn("is the disk full?", done.stderr)
+
     def test_exit_statuses_of_the_manual_are_those_of_the_documents(self):
         page = run("man").stdout
         manual = re.findall(r"\.TP\n\\fB(\d)\\fR\n(.*)\n", page[page.index(".SH EXIT STATUS"):])
