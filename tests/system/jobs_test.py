@@ -66,7 +66,8 @@ class JobsTest(unittest.TestCase):
             station = place.start_station(robots=station.endpoints["robots"])
             states = [job["state"] for job in self.jobs(station)]
             self.assertEqual(len(states), JOBS)
-            self.assertLessEqual(set(states), {"done", "interrupted"})
+            # One may fail: the run of a busy machine can be too poor to be fitted.
+            self.assertLessEqual(set(states), {"done", "failed", "interrupted"})
             self.assertIn("interrupted", states)
             with sqlite3.connect(f"file:{place.data}/station.sqlite?mode=ro", uri=True) as database:
                 for state, result in database.execute("SELECT state, result FROM job"):

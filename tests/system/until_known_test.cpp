@@ -121,5 +121,19 @@ TEST_F(UntilKnownExperiment, AStopDuringAFitEndsIt) {
   EXPECT_EQ(robot->simulated().motor_duty(), 0);
 }
 
+// SAFETY: who cuts the motor's supply at the tube, and resets that, has not said that the robot may move again.
+TEST_F(UntilKnownExperiment, ALatchDuringAFitEndsItAlsoWhenItIsResetBeforeTheNextRun) {
+  fits_take(20s);
+  const auto id = start(until_alpha(0.0001, {kFast}));
+  ASSERT_TRUE(clock.run_until([&] { return !view(id).activity.empty(); }, 60s));
+  robot->world().cut_motor_supply(true);
+  clock.run_for(500ms);
+  robot->world().cut_motor_supply(false);
+  clock.run_for(500ms);
+  ASSERT_TRUE(command_by("anna", sim_robot::clear_emergency(state().context.emergency_id)));
+  clock.run_for(1s);
+  expect_aborted(id, "emergency");
+}
+
 }  // namespace
 }  // namespace server

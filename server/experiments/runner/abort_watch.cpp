@@ -36,6 +36,8 @@ std::optional<Abort> fault_of(const station::CommandRecord& accepted) {
 
 void AbortWatch::on_samples(const station::SampleBatch& batch, std::int64_t now_us) {
   if (boot_id_ == 0) {
+    // What was made before it, and is still on its way, says nothing of the run.
+    if ((batch.context.flags & rheonaut_TELEMETRY_FLAG_BACKFILL) != 0) return;
     boot_id_ = batch.boot_id;
     first_seq_ = next_seq_ = batch.first_seq;
   }

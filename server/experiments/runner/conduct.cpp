@@ -115,6 +115,8 @@ asio::awaitable<void> Conduct::one_run(Variant variant) {
 
 asio::awaitable<void> Conduct::end_after_failure() {
   abort({"internal", "the station could not go on with it; its log says why"});
+  if (driver_) co_await driver_->settle_tasks();
+  driver_.reset();
   if (!begun_.empty() && !current().ended_at_us) co_await end_recording();
 }
 
@@ -255,16 +257,32 @@ const Abort* Conduct::pause_reason() const {
 void Conduct::on_samples(const station::SampleBatch& batch) {
   if (driver_) return driver_->on_samples(batch);
   if (batch.samples.empty()) return;
+  watch_latch(robot());
   sampled_until_us_ = batch.first_robot_time_us + (batch.samples.size() - 1) * batch.context.period_us;
   changed_.notify();
+}
+
+// Somebody puts the robot into another fluid, and resumes when that is done.
+bool Conduct::is_in_hands() const { return waiting_for_ && waiting_for_->reason == "fluid"; }
+
+// SAFETY: also between two runs, and also of a latch that is reset before the next: who stops the robot at the tube ends
+// the experiment.
+void Conduct::watch_latch(const station::RobotState& robot) {
+  if (!robot.latched() || is_in_hands()) return;
+  abort({"emergency", fmt::format("the robot is in emergency ({})", protocol::text(robot.context.emergency_cause))});
 }
 
 // SAFETY: what was prepared is lost with the boot. While the fluid is changed the robot may be switched off.
 void Conduct::on_robot(const station::RobotState& robot) {
   if (driver_) driver_->on_robot(robot);
-  if (boot_id_ == 0 || (waiting_for_ && waiting_for_->reason == "fluid")) return;
+  if (!driver_) watch_latch(robot);
+  if (boot_id_ == 0 || is_in_hands()) return;
   if (robot.boot_id != boot_id_) return abort({"reboot", "the robot has booted again"});
   if (robot.link != station::LinkState::connected) abort({"link_lost", "the link to the robot broke"});
+}
+
+void Conduct::on_event(const station::RobotEvent& event) {
+  if (driver_) driver_->on_event(event);
 }
 
 void Conduct::on_command(const station::CommandRecord& record) {

@@ -60,6 +60,7 @@ class Conduct {
   void on_samples(const station::SampleBatch& batch);
   void on_robot(const station::RobotState& robot);
   void on_command(const station::CommandRecord& record);
+  void on_event(const station::RobotEvent& event);
 
   bool is_aborting() const { return abort_.has_value(); }
   const Abort* pause_reason() const;     // null: it is not paused
@@ -100,6 +101,8 @@ class Conduct {
   void take_control();
   void check_robot();
   void check_same_fluid();
+  bool is_in_hands() const;
+  void watch_latch(const station::RobotState& robot);
   bool is_actor_there() const;
   const station::RobotState& robot() const;
   std::string peer() const;

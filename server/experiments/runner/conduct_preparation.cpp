@@ -66,6 +66,7 @@ asio::awaitable<void> Conduct::await_resumption(microseconds limit) {
     if (parts_.driver.clock.steady_us() > ends_us) abort({"paused_too_long", "nobody resumed it"});
     co_await changed_.wait_until(parts_.driver.clock, parts_.driver.clock.steady_us() + kLook.count());
   }
+  if (is_in_hands()) boot_id_ = robot().boot_id;  // it may have been switched off meanwhile
   waiting_for_.reset();
   if (!abort_ && was_paused) co_await await_actor();
 }
@@ -107,7 +108,6 @@ asio::awaitable<void> Conduct::await_fluid(std::string fluid) {
   }
   if (abort_ || !waiting_for_) co_return;
   co_await await_resumption();
-  boot_id_ = robot().boot_id;  // it may have been switched off meanwhile
   if (!abort_) take_control();
 }
 

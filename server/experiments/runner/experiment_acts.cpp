@@ -78,7 +78,7 @@ asio::awaitable<Result<ExperimentView>> Experiments::begin(storage::ExperimentRe
   if (auto allowed = check_request(request); !allowed) co_return std::unexpected{allowed.error()};
   const runtime::Counted one_more{being_added_};
   const station::RobotId robot_id = request.robot_id;
-  const std::uint64_t stops_before = stops_[robot_id];
+  const std::uint64_t holds_before = holds_[robot_id].count;
   auto job = [document = request.profile, envelope = parts_.station.envelope(),
               fluid = parts_.station.find(request.robot_id)->fluid] { return prepare(document, envelope, fluid); };
   auto prepared = co_await maths_.run(std::move(job));
@@ -118,9 +118,9 @@ asio::awaitable<Result<ExperimentView>> Experiments::begin(storage::ExperimentRe
   const ExperimentId id = experiment.id;
   Entry& kept = entries_[id];
   kept = std::move(entry);
-  if (stops_[robot_id] != stops_before) {  // SAFETY: a stop while it was being stored holds it as what waited already
+  if (holds_[robot_id].count != holds_before) {  // SAFETY: a stop, or an abort, while it was being stored holds it as well
     kept.experiment.is_held = kept.is_changed = true;
-    kept.experiment.reason = "emergency_stop";
+    kept.experiment.reason = holds_[robot_id].reason;
   }
   const WaitReason waits = wait_reason_of(kept);
   kept.waits_for = waits.reason;

@@ -42,7 +42,7 @@ Experiments::Experiments(const DriverParts& parts, storage::RecordingParts& reco
       recording_{recording},
       maths_{maths},
       allow_unattended_{allow_unattended},
-      writer_{parts.clock, recording.recorder},
+      writer_{parts.loop, parts.clock, recording.recorder},
       wake_{parts.loop},
       changed_{parts.loop} {
   parts.station.add_sink(*this);
@@ -183,11 +183,6 @@ asio::awaitable<void> Experiments::carry_out(ExperimentId id) {
   entry.experiment.state = ExperimentState::running;
   entry.experiment.reason.clear();
   entry.conduct = std::make_unique<Conduct>(conduct_parts, entry.experiment, entry.profile);
-  auto begun = [experiment = entry.experiment](storage::Database& database) {
-    storage::store_experiment(database, experiment);
-  };
-  co_await writer_.keep("the beginning of an experiment", std::move(begun));
-  publish(entry);
   const std::string name = fmt::format("experiment {}", id);
   co_await runtime::contained(parts_.tasks.exceptions(), parts_.clock, runtime::Ended::experiment, name,
                               conduct(entry));
@@ -202,6 +197,11 @@ asio::awaitable<void> Experiments::carry_out(ExperimentId id) {
 }
 
 asio::awaitable<void> Experiments::conduct(Entry& entry) {
+  auto begun = [experiment = entry.experiment](storage::Database& database) {
+    storage::store_experiment(database, experiment);
+  };
+  co_await writer_.keep("the beginning of an experiment", std::move(begun));
+  publish(entry);
   entry.end = co_await entry.conduct->run();
   entry.has_ended = true;
 }
@@ -226,7 +226,7 @@ asio::awaitable<void> Experiments::finish(Entry& entry) {
   auto ended = [experiment, note = note_of(entry, entry.end ? "aborted" : "done", by)](storage::Database& database) {
     storage::store_experiment(database, experiment, note);
   };
-  co_await writer_.keep("the end of an experiment", std::move(ended));
+  co_await keep_if_it_can_be("the end of an experiment", std::move(ended));
   publish(entry);
   const station::RobotId robot_id = experiment.request.robot_id;
   const bool is_aborted = entry.end.has_value();
@@ -240,16 +240,18 @@ asio::awaitable<void> Experiments::finish(Entry& entry) {
 
 // SAFETY: after an abort nothing begins before somebody has looked.
 asio::awaitable<void> Experiments::hold_queue(station::RobotId robot_id) {
-  std::vector<Experiment> held;
-  for (Entry* entry : queue_of(robot_id)) {
-    entry->experiment.is_held = true;
-    entry->experiment.reason = "previous_aborted";
-    held.push_back(entry->experiment);
-  }
+  std::vector<Experiment> held = hold_all(robot_id, "previous_aborted");
   auto hold = [held](storage::Database& database) {
     for (const Experiment& experiment : held) storage::store_experiment(database, experiment);
   };
-  co_await writer_.keep("the queue of a robot", std::move(hold));
+  co_await keep_if_it_can_be("the queue of a robot", std::move(hold));
+}
+
+// What no disk takes is noted, and keeps the robot's queue not.
+asio::awaitable<void> Experiments::keep_if_it_can_be(std::string what, std::function<void(storage::Database&)> change) {
+  auto keep = writer_.keep(what, std::move(change));
+  co_await runtime::contained(parts_.tasks.exceptions(), parts_.clock, runtime::Ended::experiment, what,
+                              std::move(keep));
 }
 
 storage::ExperimentState Experiments::state_of(const Entry& entry) const {
@@ -341,14 +343,25 @@ void Experiments::on_robot(const station::RobotState& robot) {
   if (Conduct* conduct = conduct_of(robot.id)) conduct->on_robot(robot);
 }
 
+void Experiments::on_event(const station::RobotState& robot, const station::RobotEvent& event) {
+  if (Conduct* conduct = conduct_of(robot.id)) conduct->on_event(event);
+}
+
 // SAFETY: after a stop nothing begins before somebody has looked, whether an experiment ran or not.
 void Experiments::hold_after_stop(const station::RobotId& robot_id) {
-  ++stops_[robot_id];
+  for (const Experiment& held : hold_all(robot_id, "emergency_stop")) entries_.at(held.id).is_changed = true;
+}
+
+// Those that were not held, held now. One that is still being added is held when it comes.
+std::vector<Experiment> Experiments::hold_all(const station::RobotId& robot_id, const char* reason) {
+  holds_[robot_id] = {holds_[robot_id].count + 1, reason};
+  std::vector<Experiment> held;
   for (Entry* entry : queue_of(robot_id)) {
-    if (entry->experiment.is_held) continue;
-    entry->experiment.is_held = entry->is_changed = true;
-    entry->experiment.reason = "emergency_stop";
+    if (std::exchange(entry->experiment.is_held, true)) continue;
+    entry->experiment.reason = reason;
+    held.push_back(entry->experiment);
   }
+  return held;
 }
 
 void Experiments::on_stop_again(const station::CommandRecord& in_force) { hold_after_stop(in_force.robot_id); }

@@ -81,6 +81,7 @@ class Experiments final : public station::StationSink {
   void on_samples(const station::RobotState& robot, const station::SampleBatch& batch) override;
   void on_robot(const station::RobotState& robot) override;
   void on_command(const station::CommandRecord& record) override;
+  void on_event(const station::RobotState& robot, const station::RobotEvent& event) override;
   void on_stop_again(const station::CommandRecord& in_force) override;
   bool watches(const station::RobotId& robot_id) const override { return running_.contains(robot_id); }
 
@@ -101,6 +102,11 @@ class Experiments final : public station::StationSink {
     std::string reason, detail;
   };
 
+  struct Hold {
+    std::uint64_t count = 0;
+    const char* reason = "";  // of the last
+  };
+
   // A document that was read, on the worker.
   struct Prepared {
     Profile profile;
@@ -117,9 +123,11 @@ class Experiments final : public station::StationSink {
   boost::asio::awaitable<void> conduct(Entry& entry);
   boost::asio::awaitable<void> finish(Entry& entry);
   boost::asio::awaitable<void> hold_queue(station::RobotId robot_id);
+  boost::asio::awaitable<void> keep_if_it_can_be(std::string what, std::function<void(storage::Database&)> change);
   boost::asio::awaitable<void> store_states(std::vector<storage::Experiment> changed);
   boost::asio::awaitable<void> settle_rest(station::RobotId robot_id);
   void hold_after_stop(const station::RobotId& robot_id);
+  std::vector<storage::Experiment> hold_all(const station::RobotId& robot_id, const char* reason);
   void note_states();
   void spawn(const std::string& name, boost::asio::awaitable<void> task);
   void begin_what_may();
@@ -149,7 +157,7 @@ class Experiments final : public station::StationSink {
   OnChange on_change_ = [](const ExperimentView&) {};
   std::map<storage::ExperimentId, Entry> entries_;             // that have not ended
   std::map<station::RobotId, storage::ExperimentId> running_;  // of each robot at most one
-  std::map<station::RobotId, std::uint64_t> stops_;            // emergency stops asked for
+  std::map<station::RobotId, Hold> holds_;                     // of all that waited for a robot
   std::map<station::RobotId, std::int64_t> commanded_at_us_;   // steady, when a person last commanded a robot
   std::set<station::RobotId> resting_;                         // of to_rest_: somebody is at it
   bool is_storing_ = false;

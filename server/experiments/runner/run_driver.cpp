@@ -21,6 +21,7 @@ namespace {
 constexpr microseconds kTurn = 20ms;           // between two looks, if no sample comes
 constexpr microseconds kBeginsAfter = 500ms;   // more than kLookAhead
 constexpr microseconds kWrongModeFor = 400ms;  // telemetry comes later than the time of a command
+constexpr double kMmOfOneM = 1e3;
 constexpr microseconds kRenewsEvery = 120ms;   // a lease lasts 500 ms
 
 // Commands of which a run knows nothing, and that change what it measures.
@@ -66,6 +67,7 @@ asio::awaitable<DriveEnd> RunDriver::run() {
   const station::RobotState* robot = parts_.station.find(request_.robot_id);
   if (robot == nullptr) co_return DriveEnd{Abort{"unknown_robot", "the robot is not known"}, Rest::latched};
   boot_id_ = robot->boot_id;
+  began_robot_us_ = robot_now_us(*robot);
   begin_at(0);
   co_await run_until_end();
   begin_generation();
@@ -168,6 +170,17 @@ void RunDriver::on_command(const station::CommandRecord& record) {
 void RunDriver::on_own_command(const station::CommandRecord& record) {
   if (!accepted_.contains(record.id)) return;
   if (auto fault = fault_of(record)) abort(std::move(*fault));
+}
+
+// SAFETY: the robot has ended its motion by itself and is in manual, as it was, so that somebody looks; the next step of
+// the line would move it again.
+void RunDriver::on_event(const station::RobotEvent& event) {
+  const bool is_of_now = event.boot_id == boot_id_ && event.robot_time_us >= began_robot_us_;
+  if (!is_of_now || event.kind != "position_uncertain") return;
+  abort({"position_uncertain",
+         fmt::format("the robot has stopped by itself: it knows its position to ± {:.0f} mm (2 sd), too little for how "
+                     "near a position limit is",
+                     kMmOfOneM * static_cast<double>(event.value))});
 }
 
 void RunDriver::abort(Abort why) {

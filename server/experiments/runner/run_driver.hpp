@@ -78,6 +78,9 @@ class RunDriver {
   void on_samples(const station::SampleBatch& batch);
   void on_robot(const station::RobotState& robot);
   void on_command(const station::CommandRecord& record);
+  void on_event(const station::RobotEvent& event);
+  // After run() has thrown: returns when no task of its own is left.
+  boost::asio::awaitable<void> settle_tasks();
 
   bool is_paused() const { return pause_.has_value(); }
   const Abort* pause_reason() const { return pause_ ? &pause_->why : nullptr; }
@@ -97,7 +100,6 @@ class RunDriver {
   boost::asio::awaitable<void> run_until_end();
   boost::asio::awaitable<void> stay_paused();
   boost::asio::awaitable<Rest> rest();
-  boost::asio::awaitable<void> settle_tasks();
   void spawn(boost::asio::awaitable<void> task);
   void on_own_command(const station::CommandRecord& record);
   void begin_generation();
@@ -128,6 +130,7 @@ class RunDriver {
   std::vector<StepBegin> begins_;
   std::size_t next_begin_ = 0;  // step whose beginning is noted next
   station::BootId boot_id_ = 0;
+  std::uint64_t began_robot_us_ = 0;
   std::int64_t wrong_mode_since_us_ = 0;  // steady; 0: it is as it is to be
   std::int64_t renewed_at_us_ = 0;
   int repeats_ = 0;

@@ -56,6 +56,16 @@ TEST_F(AbortWatchTest, APositionCountsWithTwoStandardDeviations) {
   EXPECT_EQ(reason(), "position");
 }
 
+TEST_F(AbortWatchTest, WhatWasMadeBeforeItIsNotOfTheRun) {
+  criteria_.position_max_m = 0.2;
+  batch_.context.flags = rheonaut_TELEMETRY_FLAG_BACKFILL;
+  samples(0.3F);
+  batch_.context.flags = 0;
+  next_seq_ += 600;
+  samples(0.1F);
+  EXPECT_EQ(reason(), "");
+}
+
 TEST_F(AbortWatchTest, ADisturbanceIsNoPosition) {
   criteria_.position_max_m = 0.2;
   batch_.context.disturbance_m = 0.15F;

@@ -62,6 +62,7 @@ export const kEnds: Record<string, string> = {
   unattended_limit: 'Nobody was there for as long as the robot stays in auto by itself.',
   reserved: 'The robot is reserved for somebody else.',
   emergency: 'The robot was in emergency.',
+  position_uncertain: 'The robot stopped by itself, since its position was too uncertain for how near a limit is.',
   emergency_stop: 'Somebody stopped the robot.',
   link_lost: 'The link to the robot broke.',
   reboot: 'The robot restarted.',
