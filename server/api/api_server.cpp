@@ -114,6 +114,7 @@ void ApiServer::add_routes(boost::asio::io_context& loop, station::Station& stat
   connect_fits(experiments, {clock_, analysis, recording.jobs});
   experiments.set_on_change(
       [&live](const experiments::ExperimentView& view) { live.publish_experiment(summary_json(view)); });
+  recording.runs.set_on_change([&live](const storage::Run& run) { live.publish_run(api::to_json(run)); });
   add_foxglove_routes(router_, foxglove_);
   add_audit_routes(router_, {clock_, history, recording.recorder});
 }

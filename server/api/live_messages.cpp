@@ -71,6 +71,8 @@ Result<void> on_keep_alive(const Members& message, const identity::Caller& calle
   if (!message.has("stamp_us")) return {};
   const auto stamp_us = message.integer("stamp_us", {0, INT64_MAX});
   if (!stamp_us) return std::unexpected{stamp_us.error()};
+  // SAFETY: who may command no more keeps no control, and nothing moves in their name.
+  if (!caller.scopes.allow(identity::Scope::command)) return {};
   parts.station.keep_control(caller.actor, microseconds{parts.clock.steady_us() - *stamp_us});
   return {};
 }

@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "server/analysis/metrics/run_steps.hpp"
+
 namespace server::analysis {
 namespace {
 
@@ -17,7 +19,7 @@ bool is_steered(const TracePoint& point) { return std::isfinite(point.setpoint_m
 bool is_step(const TracePoint* before, const TracePoint& point) {
   if (is_steered(point)) {
     const bool goes_on = before != nullptr && is_steered(*before) && before->setpoint_m == point.setpoint_m;
-    return !goes_on && point.setpoint_m != point.position_m;
+    return !goes_on && std::abs(point.setpoint_m - point.position_m) >= kSmallestStep_m;
   }
   if (!point.is_manual || before == nullptr || !before->is_manual) return false;
   return std::abs(point.duty - before->duty) >= kLeastDutyStep;

@@ -11,7 +11,6 @@ namespace server::analysis {
 namespace {
 
 constexpr double kBandOfStep = 0.02;
-constexpr double kSmallestStepM = 0.002;
 constexpr double kShortestStepS = 1;     // until the next setpoint
 constexpr double kLongestPauseS = 0.25;  // in a reference: a longer one hides too much of a step
 constexpr double kLongestStepS = 0.1;    // between samples of the robot, to compare in between
@@ -149,7 +148,7 @@ class Cutter {
   double size_m() const { return std::abs(step_.target_m - step_.start_m); }
 
   void finish() {
-    if (!time_s_.empty() && size_m() >= kSmallestStepM) {
+    if (!time_s_.empty() && size_m() >= kSmallestStep_m) {
       band_m_ = step_.band_m;
       control::StepExperiment experiment;
       experiment.step_at_s = step_.at_s;

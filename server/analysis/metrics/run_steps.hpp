@@ -21,6 +21,8 @@
 
 namespace server::analysis {
 
+inline constexpr double kSmallestStep_m = 0.002;  // from the position at which it begins
+
 // What of a stored sample matters here.
 struct StepPoint {
   std::uint32_t span = 0;

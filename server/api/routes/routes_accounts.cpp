@@ -193,6 +193,11 @@ http::Answer list_enrolments(AccountRoutes parts, http::Request) {
   co_return http::json_response(200, list_json("enrolments", *enrolments));
 }
 
+bool moves(const station::RobotState& robot) {
+  const bool is_driven = robot.context.mode == rheonaut_MODE_AUTO || (robot.sample && robot.sample->duty != 0);
+  return robot.link == station::LinkState::connected && is_driven;
+}
+
 http::Answer enrol_robot(AccountRoutes parts, http::Request request) {
   const auto body = Members::parse(request.body, {"robot_id"});
   if (!body) co_return http::problem(body.error());
@@ -200,6 +205,14 @@ http::Answer enrol_robot(AccountRoutes parts, http::Request request) {
   if (!robot_id) co_return http::problem(robot_id.error());
   if (!is_robot_id(*robot_id)) {
     co_return http::problem(422, "robot_id is not 1 to 31 characters of [a-z0-9_-]", "out_of_range");
+  }
+  // SAFETY: the token ends its connection, and with it the way of a stop.
+  if (const auto* robot = parts.station.find(*robot_id); robot != nullptr && moves(*robot)) {
+    co_return http::problem(409,
+                            fmt::format("robot '{}' is connected and driven; a new token ends its connection, and no "
+                                        "stop would arrive: bring it to rest first",
+                                        *robot_id),
+                            "motor_on");
   }
   const auto made = co_await parts.accounts.enrol(*robot_id, author_of(request, parts.clock));
   if (!made) co_return http::problem(made.error());

@@ -77,7 +77,6 @@ http::Answer create_run(RunRoutes parts, http::Request request) {
                   : runs.create(run_request->robot_id, run_request->conditions, by);
   const auto run = co_await std::move(made);
   if (!run) co_return http::problem(run.error());
-  parts.live.publish_run(api::to_json(*run));
   http::Response response = http::json_response(201, api::to_json(*run));
   response.headers.emplace_back("Location", fmt::format("/api/v1/runs/{}", run->id));
   co_return response;
@@ -98,7 +97,6 @@ http::Answer end_run(RunRoutes parts, http::Request request) {
   if (!verdict) co_return http::problem(verdict.error());
   const auto run = co_await parts.runs.end(*id, *verdict, author_of(request, parts.clock));
   if (!run) co_return http::problem(run.error());
-  parts.live.publish_run(api::to_json(*run));
   co_return http::json_response(200, api::to_json(*run));
 }
 
@@ -118,7 +116,6 @@ http::Answer annotate_run(RunRoutes parts, http::Request request) {
   }
   const auto run = co_await parts.runs.annotate(*id, *annotation, author_of(request, parts.clock));
   if (!run) co_return http::problem(run.error());
-  parts.live.publish_run(api::to_json(*run));
   co_return http::json_response(200, api::to_json(*run));
 }
 
@@ -129,7 +126,6 @@ http::Answer discard_run(RunRoutes parts, http::Request request) {
   if (!reason) co_return http::problem(reason.error());
   const auto run = co_await parts.runs.discard(*id, *reason, author_of(request, parts.clock));
   if (!run) co_return http::problem(run.error());
-  parts.live.publish_run(api::to_json(*run));
   co_return http::json_response(200, api::to_json(*run));
 }
 

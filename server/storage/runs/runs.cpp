@@ -194,7 +194,7 @@ asio::awaitable<Result<Run>> Runs::create(station::RobotId robot_id, RunConditio
   if (!id) co_return std::unexpected{id.error()};
   open_runs_[robot_id] = *id;
   run.id = *id;
-  co_return run;
+  co_return announced(std::move(run));
 }
 
 asio::awaitable<Result<Run>> Runs::end(RunId id, std::string verdict, station::Author by) {
@@ -236,7 +236,7 @@ asio::awaitable<Result<Run>> Runs::end(RunId id, std::string verdict, station::A
     if (!run) co_return std::unexpected{no_such_run(id)};
     if (!stored || is_complete(*run) || clock_.steady_us() >= deadline_us) {
       digester_.add(id);
-      co_return std::move(*run);
+      co_return announced(std::move(*run));
     }
     co_await clock_.sleep_for(kEndLook);
   }
@@ -271,7 +271,8 @@ asio::awaitable<Result<Run>> Runs::make_afterwards(station::RobotId robot_id, Ru
     id = co_await recorder_.on_disk(std::move(job));
   }
   digester_.add(*id);
-  co_return co_await find(*id);
+  const Result<void> made;
+  co_return co_await changed(*id, made);
 }
 
 asio::awaitable<Result<RecordedSamples>> Runs::samples_in(station::RobotId robot_id, RecordedRange range) {
@@ -316,7 +317,14 @@ asio::awaitable<Result<Run>> Runs::discard(RunId id, std::string reason, station
 
 asio::awaitable<Result<Run>> Runs::changed(RunId id, Result<void> outcome) {
   if (!outcome) co_return std::unexpected{outcome.error()};
-  co_return co_await find(id);
+  auto run = co_await find(id);
+  if (run) on_change_(*run);
+  co_return run;
+}
+
+Run Runs::announced(Run run) const {
+  on_change_(run);
+  return run;
 }
 
 asio::awaitable<Result<RunSnapshot>> Runs::snapshot(RunId id) {

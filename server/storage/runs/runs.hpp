@@ -71,6 +71,10 @@ class Runs final : public station::StationSink {
                                              const station::Author& by)>;
   void set_on_fluid(OnFluid on_fluid) { on_fluid_ = std::move(on_fluid); }
 
+  // Each run that is made, ended, annotated or discarded, by people or by an experiment.
+  using OnChange = std::function<void(const Run& run)>;
+  void set_on_change(OnChange on_change) { on_change_ = std::move(on_change); }
+
   // Ends the run with the latest sample received. Answers when that sample is durable or known lost, at most 3 s later.
   boost::asio::awaitable<Result<Run>> end(RunId id, std::string verdict, station::Author by = {});
 
@@ -99,6 +103,7 @@ class Runs final : public station::StationSink {
   Result<void> check_fluid(std::string& fluid) const;
   boost::asio::awaitable<Result<RecordedSamples>> samples_in(station::RobotId robot_id, RecordedRange range);
   boost::asio::awaitable<Result<Run>> changed(RunId id, Result<void> outcome);
+  Run announced(Run run) const;
 
   // How far each robot's boot has come; what the database does not know yet of an open span.
   std::map<station::BootId, std::uint64_t> heads() const;
@@ -116,6 +121,7 @@ class Runs final : public station::StationSink {
   OnFluid on_fluid_ = [](const station::RobotId&, const std::string&, const station::Author&) {
     return Result<void>{};
   };
+  OnChange on_change_ = [](const Run&) {};
   std::set<RunId> ending_;  // of these, the ones whose end is being stored
 };
 

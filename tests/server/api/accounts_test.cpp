@@ -166,6 +166,24 @@ TEST_F(AccountsTest, ARobotIsEnrolledRevokedAndEnrolledAgain) {
   EXPECT_NE(again.parsed()["secret"], made.parsed()["secret"]);
 }
 
+// SAFETY: no stop would arrive at a robot that its new token keeps out.
+TEST_F(AccountsTest, ARobotThatIsDrivenIsGivenNoToken) {
+  connect_robot();
+  auto frame = TestRobot::samples_frame(0, 1, robot->robot_now_us(), 0);
+  frame.body.telemetry.duty[0] = 0.3F;
+  robot->send(frame);
+  clock.settle();
+  const Answered refused = ask("POST", "/api/v1/enrolments", {{"robot_id", "r1"}});
+  EXPECT_EQ(refused.status, 409);
+  EXPECT_EQ(refused.parsed()["reason"], "motor_on");
+  EXPECT_EQ(station.find("r1")->link, station::LinkState::connected);
+  frame = TestRobot::samples_frame(1, 1, robot->robot_now_us(), 0);
+  frame.body.telemetry.duty[0] = 0;
+  robot->send(frame);
+  clock.settle();
+  EXPECT_EQ(ask("POST", "/api/v1/enrolments", {{"robot_id", "r1"}}).status, 201);
+}
+
 TEST_F(AccountsTest, RevokingEndsTheConnectionAndKeepsTheRobotOut) {
   connect_robot();
   make_samples(*robot, 0, 10);

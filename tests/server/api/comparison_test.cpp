@@ -76,6 +76,16 @@ TEST(ComparedRuns, AreAlignedAtSetpointsDutiesAndDisturbances) {
   EXPECT_EQ(aligned(Trace{}, {}).error().detail, "run 7 has no stored sample");
 }
 
+// As in the table of its steps: to hold is no step.
+TEST(ComparedRuns, ARunThatBeginsWhileItHoldsIsAlignedAtItsFirstNewSetpoint) {
+  Trace trace;
+  trace.setpoint_m = 0.0001F;
+  trace.add(20);
+  trace.setpoint_m = 0.5F;
+  trace.add(30);
+  EXPECT_EQ(aligned(trace, {AlignAt::step, 1, {}})->seq, 20U);
+}
+
 TEST(ComparedRuns, AStepInAGapIsUncertainByIt) {
   Trace trace;
   trace.setpoint_m = 0.1F;

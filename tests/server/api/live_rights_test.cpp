@@ -123,6 +123,32 @@ TEST_F(LiveRightsTest, AUserWithAnotherRoleComesBackWithIt) {
   EXPECT_TRUE(open_by_cookie(secret)->answer.starts_with("HTTP/1.1 401 "));
 }
 
+// SAFETY: nobody keeps a robot from others that they may not command themselves.
+TEST_F(LiveRightsTest, WhoMayCommandNoMoreKeepsNoControl) {
+  connect_robot();
+  add_user("otto", "operator");
+  const std::string secret = make_session("otto");
+  const auto stay = [this](Page& page) {
+    for (int i = 0; i < 50; ++i) {
+      page.say({{"type", "keep_alive"}, {"stamp_us", clock.steady_us()}});
+      clock.run_for(100ms);
+    }
+  };
+  const auto page = open_by_cookie(secret);
+  ASSERT_TRUE(page->open());
+  station::ControlRequest take;
+  take.robot_id = "r1";
+  take.actor = page->receive("welcome")["actor"];
+  ASSERT_TRUE(station.control(take));
+  stay(*page);
+  EXPECT_EQ(station.holder("r1"), take.actor);
+  ASSERT_EQ(ask("POST", "/api/v1/users/otto/change", {{"role", "viewer"}}).status, 200);
+  const auto again = open_by_cookie(secret);
+  ASSERT_TRUE(again->open());
+  stay(*again);
+  EXPECT_EQ(station.holder("r1"), "");
+}
+
 TEST_F(LiveRightsTest, SigningOutEndsTheSessionAndItsPages) {
   const std::string secret = make_session("");
   const auto page = open_by_cookie(secret);

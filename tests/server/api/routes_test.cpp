@@ -360,6 +360,28 @@ TEST_F(RoutesTest, EventsComeNewestFirst) {
   EXPECT_EQ(events[0]["event_seq"], nullptr);
 }
 
+// As an experiment makes and ends them, past the routes.
+TEST_F(RoutesTest, PagesHearOfRunsThatNoRequestMakes) {
+  connect_robot();
+  live::Subscriber page{loop};
+  live.add(page);
+  const auto make = [this]() -> boost::asio::awaitable<void> {
+    storage::RunConditions conditions;
+    conditions.name = "of an experiment";
+    const auto run = co_await recording.runs.create("r1", std::move(conditions));
+    if (run) co_await recording.runs.end(run->id, "done");
+  };
+  tasks.spawn("an experiment", make());
+  clock.run_for(5s);
+  std::vector<json> states;
+  for (live::LiveText text = page.pop(); text != nullptr; text = page.pop()) {
+    const json message = json::parse(*text);
+    if (message["type"] == "run") states.push_back(message["run"]["state"]);
+  }
+  EXPECT_EQ(states, (std::vector<json>{"open", "ended"}));
+  live.remove(page);
+}
+
 TEST_F(RoutesTest, PagesHearOfRuns) {
   connect_robot();
   live::Subscriber page{loop};
