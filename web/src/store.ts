@@ -174,10 +174,14 @@ export class Store {
     return this.by_id.get(robot_id);
   }
 
-  // saw_change: this page was there when what changed has changed.
-  private take_states(states: RobotState[], saw_change = true): void {
+  // is_news: the page was there before; a latch that it saw begin is one that the robot had not in the state before.
+  private take_states(states: RobotState[], is_news = true): void {
     const now_ms = this.clocks.page_ms();
-    for (const state of states) this.latches.note(state.emergency_id, this.clocks.utc_ms(), saw_change);
+    for (const { robot_id, emergency_id } of states) {
+      const before = this.by_id.get(robot_id)?.emergency_id.peek();
+      const saw_begin = is_news && before !== undefined && before !== emergency_id;
+      this.latches.note(emergency_id, this.clocks.utc_ms(), saw_begin);
+    }
     const known_before = this.by_id.size;
     for (const state of states) {
       const known = this.by_id.get(state.robot_id);

@@ -9,8 +9,8 @@ const robot = (robot_id: string, change: Partial<RobotState> = {}) =>
   ({ robot_id, link: 'connected', mode: 'manual', sub_state: 'none', emergency_id: null, ...change }) as RobotState;
 
 function store_with(...robots: RobotState[]) {
-  const clock = { page: 0 };
-  const store = new Store({ page_ms: () => clock.page, utc_ms: () => 1_700_000_000_000 });
+  const clock = { page: 0, utc: 1_700_000_000_000 };
+  const store = new Store({ page_ms: () => clock.page, utc_ms: () => clock.utc });
   store.receive({ type: 'welcome', actor: 'session:1', version: '', utc_us: 0, stamp_us: 0, robots });
   return { store, clock };
 }
@@ -261,6 +261,22 @@ test('what was not asked for is not missing afterwards', () => {
   store.receive(batch(500, 5));
   store.refresh();
   expect(store.find('rheo-1')!.readout.value).toMatchObject({ received: 5, missing: 0 });
+});
+
+test('the time of a latch is known only of one that this page saw begin', () => {
+  const latched = { mode: 'emergency', emergency_id: '7' } as const;
+  const { store, clock } = store_with(robot('a', latched), robot('b'));
+  const name = (id: string) => store.latches.name(id, 'operator');
+  const since = name('7');
+  expect(since).toMatch(/^operator, before /);
+  clock.utc += 60_000;
+  store.receive({ type: 'robot', robot: robot('a', latched) }); // ten a second
+  expect(name('7')).toBe(since);
+  store.receive({ type: 'robot', robot: robot('b', { mode: 'emergency', emergency_id: '8' }) });
+  expect(name('8')).not.toContain('before');
+  store.receive({ type: 'robot', robot: robot('c', { mode: 'emergency', emergency_id: '9' }) }); // not known until now
+  store.receive({ type: 'robot', robot: robot('c', { mode: 'emergency', emergency_id: '9' }) });
+  expect(name('9')).toContain('before');
 });
 
 test('what is known of a robot that is not watched is old while the page is cut off', () => {
