@@ -112,11 +112,16 @@ test('a held duty ends on the page when somebody else has taken control, and not
 
 test('when the link comes up the log gets what happened before: of each robot, of a large fleet of the selected one', async () => {
   const asked: string[] = [];
+  let [open, most_open] = [0, 0];
   const happened = { robot_id: 'r-1', event_seq: 1, kind: 'mode_changed', received_at_us: 5e6 } as EventRecord;
-  vi.stubGlobal('fetch', (path: string) => {
-    if (/\/robots\/.*limit=/.test(path)) asked.push(path);
+  vi.stubGlobal('fetch', async (path: string) => {
+    const is_past = /\/robots\/.*limit=/.test(path);
+    if (is_past) asked.push(path);
+    if (is_past) most_open = Math.max(most_open, ++open);
+    await Promise.resolve();
+    if (is_past) open -= 1;
     const events = path.includes('/r-1/events') ? [happened] : [];
-    return Promise.resolve(new Response(JSON.stringify({ events, commands: [], runs: [], fluids: [] })));
+    return new Response(JSON.stringify({ events, commands: [], runs: [], fluids: [] }));
   });
   for (const [size, requests] of [
     [2, 4],
@@ -131,6 +136,7 @@ test('when the link comes up the log gets what happened before: of each robot, o
     await vi.waitFor(() => expect(asked).toHaveLength(requests));
     await vi.waitFor(() => expect(session.store.log.value.map((line) => line.event?.kind)).toContain('mode_changed'));
   }
+  expect(most_open).toBe(1); // a stop by HTTP waits behind none of them
 });
 
 test('a past that could not be read is noted', async () => {
