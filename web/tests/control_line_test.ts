@@ -102,7 +102,7 @@ test('the focus stays in the line when the button that had it is disabled and go
   expect(page.find('take-control')).toBeNull();
   expect(page.find('release-control')).not.toBeNull();
   expect(fake_document.activeElement).toBe(line);
-  expect(line.attributes['tabIndex']).toBe('-1');
+  expect(line.tabIndex).toBe(-1);
 });
 
 test('the line takes the focus from nothing else', async () => {

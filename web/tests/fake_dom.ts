@@ -10,6 +10,7 @@ export class FakeNode {
   readonly attributes: Record<string, string> = {};
   readonly listeners = new Map<string, Listener>();
   parentNode: FakeNode | null = null;
+  tabIndex = 0;
 
   constructor(
     readonly nodeType: number,

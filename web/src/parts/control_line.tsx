@@ -36,7 +36,6 @@ export function ControlLine({ session, robot }: { session: Session; robot: Robot
       ref={root}
       role="group"
       aria-label="Who is in control"
-      tabIndex={-1}
       data-holder={is_current ? (control?.holder ?? '') : ''}
     >
       <p>

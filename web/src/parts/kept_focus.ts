@@ -2,8 +2,8 @@
 
 import { useLayoutEffect, useRef } from 'preact/hooks';
 
-// For the element that gets the focus, with tabIndex -1; once it is gone itself, its parent gets it. Never another button:
-// the key that is still down would press it.
+// For the element that gets the focus; once it is gone itself, its parent gets it. Never another button: the key that is
+// still down would press it.
 export function useKeptFocus() {
   const root = useRef<HTMLDivElement>(null);
   const before = root.current;
@@ -11,7 +11,10 @@ export function useKeptFocus() {
   const parent = before?.parentElement ?? null;
   useLayoutEffect(() => {
     if (!focused || (root.current?.contains(focused) && !focused.matches(':disabled'))) return;
-    (root.current ?? parent)?.focus({ preventScroll: true });
+    const nearest = root.current ?? parent;
+    if (!nearest) return;
+    nearest.tabIndex = -1; // by Tab nobody comes to it
+    nearest.focus({ preventScroll: true });
   });
   return root;
 }

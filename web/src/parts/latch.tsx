@@ -35,7 +35,7 @@ export function Latch({ session, robot }: { session: Session; robot: Robot }) {
     if (is_cleared) session.emergency.cleared(robot_id, press);
   };
   return (
-    <div class="latch" id="latch" ref={root} tabIndex={-1} data-emergency-id={known_id ?? ''}>
+    <div class="latch" id="latch" ref={root} data-emergency-id={known_id ?? ''}>
       <h2>{mode === 'emergency' ? 'Latched: the motor stays off' : 'Stop not acknowledged yet'}</h2>
       <p class="latch-name">
         <b>{robot_id}</b> {mode === 'emergency' ? name || 'cause not known yet' : 'operator'}

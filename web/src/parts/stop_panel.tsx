@@ -39,7 +39,7 @@ export function StopPanel({ session }: { session: Session }) {
           {readiness.works ? latency_text(readiness) : readiness.text}
         </span>
       </button>
-      <div class="stop-below" tabIndex={-1}>
+      <div class="stop-below">
         {robot && <Latch session={session} robot={robot} key={robot.robot_id} />}
         <StopLine session={session} />
         <StopNote why={readiness.why} parts={readiness.parts} />
