@@ -106,6 +106,29 @@ const steps = {
     await anna.click('#release-control');
   },
 
+  async 'a hold that takes control leaves its button under the pointer'() {
+    await until('nobody is in control', async () => /^Nobody/.test(await control(anna).innerText()));
+    const hold = anna.locator('#hold-to-run');
+    await hold.hover();
+    const before = await hold.boundingBox();
+    await anna.mouse.down();
+    await until('anna is in control', async () => (await control(anna).innerText()).includes('You are in control'));
+    const after = await hold.boundingBox();
+    await anna.mouse.up();
+    assert.ok(Math.abs(after.y - before.y) < 1, `from ${before.y} to ${after.y}`);
+    await until('the motor is off', async () => (await robot()).sample.duty === 0);
+  },
+
+  async 'a key that gives or takes control leaves the focus where it was pressed'() {
+    for (const id of ['release-control', 'take-control', 'release-control']) {
+      await anna.locator(`#${id}:enabled`).focus();
+      await anna.keyboard.press('Enter');
+      await anna.locator(`#${id}`).waitFor({ state: 'detached' });
+      assert.equal(await anna.evaluate(() => document.activeElement.id), 'control-line', id);
+    }
+    await until('nobody is in control', async () => (await holder()) === '');
+  },
+
   async 'a page whose network stands still for 5 s renews nothing and moves nothing afterwards'() {
     slow = await bench.open_page();
     await sign_in(slow, await bench.start_proxy(), 'ben');

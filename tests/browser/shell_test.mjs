@@ -142,8 +142,17 @@ const steps = {
     const other = await page.context().newPage();
     await other.goto(`${bench.http}/#/robot/${kRobot}`);
     await other.locator('.annunciator h1').waitFor();
+    await other.locator('.log-strip').getByText('emergency stop').first().waitFor(); // of before it was opened
+    await until('two tabs know of each other', async () => (await other.locator('#other-tabs').count()) === 1);
     await bench.station.end('SIGKILL');
     await other.locator('#cut-off-frame').waitFor();
+    await other.click('#show-alarms');
+    for (const colorScheme of ['light', 'dark']) {
+      await other.emulateMedia({ colorScheme });
+      await other.evaluate(kAxe);
+      const { violations } = await other.evaluate(() => window.axe.run('#status', { runOnly: ['color-contrast'] }));
+      assert.deepEqual(violations.flatMap(({ nodes }) => nodes.map(({ html }) => html)), [], `cut off, ${colorScheme}`);
+    }
     await other.route('**/*.js', (asked) => asked.abort()); // the browser may have kept the file of the view
     await other.click('#open-fleet');
     await other.locator('#not-loaded').waitFor();

@@ -12,6 +12,8 @@ export interface Alarm {
   text: string;
 }
 
+const kNotAcknowledged = 'stop not acknowledged yet';
+
 export function alarms_of(session: Session): ReadonlySignal<Alarm[]> {
   const { store, settings } = session;
   // Computed of its own, so that what changes with each sample changes no list.
@@ -24,7 +26,11 @@ export function alarms_of(session: Session): ReadonlySignal<Alarm[]> {
     const hidden = settings.hidden_robots.names.value;
     for (const robot of store.robots.value) {
       const is_out_of_sight = hidden.has(robot.robot_id) && robot.is_away.value; // no longer calls
-      if (robot.is_alarming.value && !is_out_of_sight) add('alarm', 'emergency', emergency_text(robot), robot.robot_id);
+      if (is_out_of_sight) continue;
+      if (robot.is_alarming.value) add('alarm', 'emergency', emergency_text(robot), robot.robot_id);
+      if (robot.is_stop_kept.value)
+        add('alarm', 'stop_kept', `${kNotAcknowledged}: kept for its return`, robot.robot_id);
+      if (robot.is_lost_in_motion.value) add('alarm', 'lost', 'the link broke while it was driven', robot.robot_id);
       if (session.cut_off.value) continue; // of each robot the same would be said
       if (robot.is_silent.value) add('caution', 'silent', 'connected, and sends no samples', robot.robot_id);
       if (robot.is_unstoppable.value) add('alarm', 'stop_path', 'does not answer the stop’s probes', robot.robot_id);
@@ -41,6 +47,6 @@ export function alarms_of(session: Session): ReadonlySignal<Alarm[]> {
 
 function emergency_text(robot: Robot): string {
   const { mode, emergency_cause, pending_stop } = robot.state.peek();
-  if (mode !== 'emergency' && pending_stop !== null) return 'stop not acknowledged yet';
+  if (mode !== 'emergency' && pending_stop !== null) return kNotAcknowledged;
   return `emergency, ${words(emergency_cause)}`;
 }

@@ -128,6 +128,12 @@ export class Api {
   events = async (robot_id: string) =>
     (await this.ask<{ events: EventRecord[] }>('GET', `/robots/${encodeURIComponent(robot_id)}/events?limit=200`))
       .events;
+  // The newest of each for a log, which has no line for a renewal of a lease.
+  newest_events = async (robot_id: string, limit: number) =>
+    (await this.ask<{ events: EventRecord[] }>('GET', past(robot_id, 'events', { limit }))).events;
+  newest_commands = async (robot_id: string, limit: number) =>
+    (await this.ask<{ commands: CommandRecord[] }>('GET', past(robot_id, 'commands', { limit, renewals: 'false' })))
+      .commands;
   open_runs = async () => (await this.ask<{ runs: RunRecord[] }>('GET', '/runs?state=open&limit=1000')).runs;
   // null: the station has no list; then a fluid belongs to a run alone.
   fluids = async (): Promise<Fluid[] | null> => {

@@ -102,11 +102,21 @@ export class Robot {
   readonly is_away = computed(() => this.state.value.link !== 'connected');
   // Out of use, and not there: it is listed only where it is asked for, and the stop of all leaves it out.
   readonly is_left_out = computed(() => this.state.value.retired === true && this.is_away.value);
-  // In an emergency, or with a stop that is on its way.
+  // In an emergency, or with a stop that is on its way. A list of the fleet counts one that is away as away: its stop is kept.
   readonly is_alarming = computed(() => {
     const { mode, emergency_id, pending_stop } = this.state.value;
     if (this.is_left_out.value) return false;
     return mode === 'emergency' || emergency_id !== null || (pending_stop !== null && !this.is_away.value);
+  });
+  // Away, and a stop waits for it: whether it moves on nobody knows.
+  readonly is_stop_kept = computed(
+    () => this.is_away.value && !this.is_left_out.value && this.state.value.pending_stop !== null,
+  );
+  // Away, and driven by the last that was received of it. One that was at rest may have been switched off on purpose.
+  readonly is_lost_in_motion = computed(() => {
+    const { mode, sample } = this.state.value;
+    if (!this.is_away.value || this.is_left_out.value || this.is_alarming.value) return false;
+    return mode === 'auto' || (sample?.duty ?? 0) !== 0;
   });
   readonly readout = signal<Readout>(kNothingRead);
   readonly mode = computed(() => this.state.value.mode);

@@ -19,12 +19,13 @@ import { DutyHold } from './duty_hold';
 import { EmergencyStop, kIdleStop } from './emergency';
 import { ExperimentsApi } from './experiments_api';
 import { is_refused_in_past, shows_past } from './past_guard';
+import type { Robot } from './robot';
 import { go_to, route } from './route';
 import { kCurrent_ms, LiveLink, type LinkPhase, type Surroundings } from './live';
 import { StationPath } from './station_path';
 import { StopPath } from './stop_path';
 import { browser_shelf, ViewSettings } from './settings';
-import { kRefresh_ms, Store } from './store';
+import { kLogLines, kRefresh_ms, Store } from './store';
 import { browser_channel, kTell_ms, Tabs } from './tabs';
 import { Vitals } from './vitals';
 
@@ -79,7 +80,10 @@ export class Session {
         this.measure(message);
         if (message.type === 'problem') this.hold.lapse(); // the only message that it can be about, but for a stop
         this.store.receive(message);
-        if (message.type === 'welcome') this.emergency.again();
+        if (message.type === 'welcome') {
+          this.emergency.again();
+          void this.load_log();
+        }
         // With each stamp: what this page has set going needs a sign of life within 400 ms.
         if (message.type === 'stamp' && this.store.experiments.needs_sign_of_life(this.store.actor.peek()))
           this.keep_alive();
@@ -254,6 +258,22 @@ export class Session {
     } catch (error) {
       this.store.note(error instanceof Error ? error.message : String(error));
     }
+  }
+
+  // What happened before this page was there, or while it was cut off; of a large fleet with the robot that is selected.
+  private async load_log(): Promise<void> {
+    const { robots, selected } = this.store;
+    const is_fleet = robots.peek().length > kMaxWatchedAtOnce;
+    const asked = is_fleet ? [selected.peek()].filter((robot) => robot !== null) : robots.peek();
+    const asked_at = this.store.mark_log();
+    const load = async ({ robot_id }: Robot) => {
+      const events = await this.api.newest_events(robot_id, kLogLines);
+      this.store.take_past(events, await this.api.newest_commands(robot_id, kLogLines), asked_at);
+    };
+    let is_whole = true;
+    // One after the other: a browser has six connections to a station, and a stop by HTTP may need one.
+    for (const robot of asked) await load(robot).catch(() => (is_whole = false));
+    if (!is_whole) this.store.note('What had happened before could not be read: the log may have less than there was.');
   }
 
   // A page that stood still (a machine under load) receives first what waits for it: one refresh is let pass, never two.

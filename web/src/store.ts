@@ -163,21 +163,48 @@ export class Store {
       const now_ms = this.clocks.page_ms();
       this.now_ms.value = now_ms;
       for (const robot of this.robots.peek()) robot.refresh(now_ms, this.is_current.peek());
-      if (this.pending_log.length > 0) {
-        this.log.value = merge_log(this.pending_log, this.log.peek());
-        this.pending_log = [];
-      }
+      this.show_pending();
     });
+  }
+
+  private show_pending(): void {
+    if (this.pending_log.length === 0) return;
+    this.log.value = merge_log(this.pending_log, this.log.peek());
+    this.pending_log = [];
+  }
+
+  // To be had before the past is asked for, and given back with the answer: lines that have changed since are newer.
+  mark_log(): ReadonlySet<LogLine> {
+    this.show_pending();
+    return new Set(this.log.peek());
+  }
+
+  // What the station has listed of before this page was there, or of while it was cut off.
+  take_past(events: EventRecord[], commands: CommandRecord[], asked_at: ReadonlySet<LogLine>): void {
+    this.show_pending();
+    for (const event of events) this.date_latch_of(event);
+    const lines = new Map(this.log.peek().map((line) => [line.key, line]));
+    for (const line of [...events.map((event) => this.line_of_event(event)), ...commands.map(line_of_command)]) {
+      const shown = lines.get(line.key);
+      // Of an event nothing changes, and the line that is shown may know its ±.
+      const is_newer = shown === undefined || (line.command !== null && asked_at.has(shown));
+      if (is_newer && !is_routine(line)) lines.set(line.key, line);
+    }
+    this.log.value = [...lines.values()].sort((a, b) => b.at_ms - a.at_ms).slice(0, kLogLines);
   }
 
   find(robot_id: string): Robot | undefined {
     return this.by_id.get(robot_id);
   }
 
-  // saw_change: this page was there when what changed has changed.
-  private take_states(states: RobotState[], saw_change = true): void {
+  // is_news: the page was there before; a latch that it saw begin is one that the robot had not in the state before.
+  private take_states(states: RobotState[], is_news = true): void {
     const now_ms = this.clocks.page_ms();
-    for (const state of states) this.latches.note(state.emergency_id, this.clocks.utc_ms(), saw_change);
+    for (const { robot_id, emergency_id } of states) {
+      const before = this.by_id.get(robot_id)?.emergency_id.peek();
+      const saw_begin = is_news && before !== undefined && before !== emergency_id;
+      this.latches.note(emergency_id, this.clocks.utc_ms(), saw_begin);
+    }
     const known_before = this.by_id.size;
     for (const state of states) {
       const known = this.by_id.get(state.robot_id);
@@ -237,8 +264,12 @@ export class Store {
   }
 
   private take_event(event: EventRecord): void {
-    if (event.kind === 'emergency') this.latches.note(event.emergency_id, event.received_at_us / 1000, true);
+    this.date_latch_of(event);
     this.write(this.line_of_event(event));
+  }
+
+  private date_latch_of({ kind, emergency_id, received_at_us }: EventRecord): void {
+    if (kind === 'emergency') this.latches.note(emergency_id, received_at_us / 1000, true);
   }
 
   private take_command(command: CommandRecord): void {

@@ -84,6 +84,49 @@ test('one that is hidden calls while it is there, and no longer when it is away'
   expect(keys.value).toEqual([]);
 });
 
+test('a stop that waits for a robot that is away is an alarm until it is acknowledged, and none of one out of use', () => {
+  const away = state('a', { link: 'disconnected', pending_stop: '5' });
+  const { session, alarms, keys, store } = page_with(
+    away,
+    state('b', { link: 'disconnected', retired: true, pending_stop: '6' }),
+  );
+  expect(alarms.value.map(({ level, robot_id, text }) => [level, robot_id, text])).toEqual([
+    ['alarm', 'a', 'stop not acknowledged yet: kept for its return'],
+  ]);
+  store.receive({ type: 'robot', robot: { ...away, link: 'connected' } });
+  expect(keys.value).toEqual(['emergency a']);
+  store.receive({ type: 'robot', robot: away });
+  session.settings.hidden_robots.names.value = new Set(['a']);
+  expect(keys.value).toEqual([]);
+});
+
+test('a link that broke while the robot was driven is an alarm until it is back, retired or hidden; one at rest may go', () => {
+  const driven = { ...state('a'), sample: { duty: -0.2 } } as RobotState;
+  const { session, alarms, keys, store } = page_with(driven, state('b', { mode: 'auto' }), {
+    ...state('c'),
+    sample: { duty: 0 },
+  } as RobotState);
+  expect(keys.value).toEqual([]);
+  const change = (robot: RobotState) => store.receive({ type: 'robot', robot });
+  change({ ...driven, link: 'disconnected' });
+  change(state('b', { mode: 'auto', link: 'disconnected' }));
+  change({ ...state('c', { link: 'disconnected' }), sample: { duty: 0 } } as RobotState);
+  expect(alarms.value.map(({ level, robot_id, text }) => [level, robot_id, text])).toEqual([
+    ['alarm', 'a', 'the link broke while it was driven'],
+    ['alarm', 'b', 'the link broke while it was driven'],
+  ]);
+  change(state('b', { mode: 'auto', link: 'disconnected', retired: true }));
+  expect(keys.value).toEqual(['lost a']);
+  session.settings.hidden_robots.names.value = new Set(['a']);
+  expect(keys.value).toEqual([]);
+  session.settings.hidden_robots.names.value = new Set();
+  change(state('b', { mode: 'auto', link: 'disconnected' }));
+  change(driven);
+  expect(keys.value).toEqual(['lost b']);
+  change(state('b', { mode: 'emergency', emergency_id: '1', link: 'disconnected' })); // its motor is off
+  expect(keys.value).toEqual(['emergency b']);
+});
+
 test('that nothing is recorded is an alarm, in the station’s words', () => {
   const { session, alarms } = page_with(state('a'));
   session.recording.value = { state: 'low_space', problem: 'The disk is full: delete something.' };

@@ -11,6 +11,7 @@ import { fake_document, FakeNode } from './fake_dom';
 
 beforeEach(() => {
   vi.useFakeTimers();
+  fake_document.activeElement = null;
   vi.stubGlobal('document', fake_document);
   vi.stubGlobal('window', globalThis);
   for (const name of ['addEventListener', 'removeEventListener']) vi.stubGlobal(name, () => undefined);
@@ -20,17 +21,17 @@ afterEach(() => {
   vi.useRealTimers();
 });
 
-const held_by = (holder: string) =>
+const held_by = (holder: string | null) =>
   ({
     robot_id: 'a',
     link: 'connected',
     mode: 'manual',
     emergency_id: null,
     pending_stop: null,
-    control: { holder },
+    control: holder && { holder, wished_by: null },
   }) as unknown as RobotState;
 
-function drawn_for(role: string, holder = 'user:ben/session:2') {
+function drawn_for(role: string, holder: string | null = 'user:ben/session:2') {
   const store = new Store({ page_ms: () => 0, utc_ms: () => 0 });
   store.receive({
     type: 'welcome',
@@ -86,6 +87,32 @@ test('a hold that began before control changed hands takes nothing from the next
   store.receive({ type: 'robot', robot: held_by('user:carla/session:3') });
   await vi.advanceTimersByTimeAsync(2 * kGuard_ms);
   expect(asked).toEqual([]);
+});
+
+test('the focus stays in the line when the button that had it is disabled and goes away, and goes to no other button', async () => {
+  const { page, asked, store } = drawn_for('operator', null);
+  const line = page.find('control-line')!;
+  page.find('take-control')!.focus();
+  page.find('take-control')!.fire('Click');
+  await vi.advanceTimersByTimeAsync(100);
+  expect(asked).toEqual([{ action: 'take' }]);
+  expect(fake_document.activeElement).toBe(line);
+  store.receive({ type: 'robot', robot: held_by('user:anna/session:1') });
+  await vi.advanceTimersByTimeAsync(100);
+  expect(page.find('take-control')).toBeNull();
+  expect(page.find('release-control')).not.toBeNull();
+  expect(fake_document.activeElement).toBe(line);
+  expect(line.tabIndex).toBe(-1);
+});
+
+test('the line takes the focus from nothing else', async () => {
+  const { page, store } = drawn_for('operator', null);
+  const elsewhere = page.insertBefore(new FakeNode(1, 'input'), null);
+  elsewhere.focus();
+  store.receive({ type: 'robot', robot: held_by('user:anna/session:1') });
+  await vi.advanceTimersByTimeAsync(100);
+  expect(page.find('release-control')).not.toBeNull();
+  expect(fake_document.activeElement).toBe(elsewhere);
 });
 
 test('nobody else is offered it, and not the holder either', () => {

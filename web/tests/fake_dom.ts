@@ -10,6 +10,7 @@ export class FakeNode {
   readonly attributes: Record<string, string> = {};
   readonly listeners = new Map<string, Listener>();
   parentNode: FakeNode | null = null;
+  tabIndex = 0;
 
   constructor(
     readonly nodeType: number,
@@ -38,8 +39,18 @@ export class FakeNode {
     return this.insertBefore(node, null);
   }
   removeChild(node: FakeNode): void {
+    if (node.contains(fake_document.activeElement)) fake_document.activeElement = null;
     this.childNodes.splice(this.childNodes.indexOf(node), 1);
     node.parentNode = null;
+  }
+  get parentElement(): FakeNode | null {
+    return this.parentNode;
+  }
+  focus(): void {
+    fake_document.activeElement = this;
+  }
+  matches(selector: ':disabled'): boolean {
+    return selector === ':disabled' && 'disabled' in this.attributes;
   }
   remove(): void {
     this.parentNode?.removeChild(this);
@@ -82,6 +93,7 @@ export class FakeNode {
 }
 
 export const fake_document = {
+  activeElement: null as FakeNode | null,
   createElementNS: (_: string, name: string) => new FakeNode(1, name),
   createElement: (name: string) => new FakeNode(1, name),
   createTextNode: (text: string) => new FakeNode(3, '', text),

@@ -30,6 +30,7 @@ test('each robot is in one state, the worst', () => {
   expect(fleet_state_of(robot('a', { mode: 'auto' }))).toBe('auto');
   expect(fleet_state_of(robot('a', { mode: 'auto' }, true))).toBe('silent');
   expect(fleet_state_of(robot('a', { link: 'disconnected', mode: 'auto' }))).toBe('away');
+  expect(fleet_state_of(robot('a', { link: 'disconnected', pending_stop: '5' }))).toBe('away');
   expect(fleet_state_of(robot('a', { mode: 'emergency', emergency_id: '1' }, true))).toBe('emergency');
   expect(fleet_state_of(robot('a', { link: 'disconnected', mode: 'emergency', emergency_id: '1' }))).toBe('emergency');
 });

@@ -48,3 +48,13 @@ test('the arguments of a command have their units, and a timed one says when, at
   );
   expect(arguments_text({ duty: 0.3 })).toBe(' 30.0 %');
 });
+
+test('of a schedule a line has how many duties and how long they last, and no nested value is written out', () => {
+  const schedule = Array.from({ length: 64 }, (_, n) => ({ tick: 5 * n, duty: n < 63 ? 0.3 : 0 }));
+  expect(arguments_text({ schedule })).toBe(' 64 duties over 3.15 s');
+  expect(arguments_text({ schedule: [{ tick: 0, duty: 0 }] })).toBe(' 1 duty over 0.00 s');
+  expect(arguments_text({ kp: 2, pole: [0.1, 0.2] })).toBe(' 2 pole: 2');
+  expect(arguments_text({ setup: { a: [1] } })).toBe(' setup {"a":[1]}');
+  expect(arguments_text({ setup: { text: 'x'.repeat(500) }, note: 'y'.repeat(500) }).length).toBeLessThan(140);
+  expect(arguments_text({ boot_id: null })).toBe(' null');
+});

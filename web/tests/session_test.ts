@@ -1,8 +1,9 @@
 // What the session does with what a page sends.
 import { afterEach, expect, test, vi } from 'vitest';
-import type { Recording, RobotState } from '../src/api';
+import type { EventRecord, Recording, RobotState } from '../src/api';
 import { kLease_ms } from '../src/duty_hold';
 import { Session } from '../src/session';
+import { FakeSocket } from './fakes';
 
 afterEach(() => {
   vi.unstubAllGlobals();
@@ -107,6 +108,42 @@ test('a held duty ends on the page when somebody else has taken control, and not
   refresh();
   expect(session.held.value.robot_id).toBeNull();
   expect(sent).toEqual([0.3]);
+});
+
+test('when the link comes up the log gets what happened before: of each robot, of a large fleet of the selected one', async () => {
+  const asked: string[] = [];
+  let [open, most_open] = [0, 0];
+  const happened = { robot_id: 'r-1', event_seq: 1, kind: 'mode_changed', received_at_us: 5e6 } as EventRecord;
+  vi.stubGlobal('fetch', async (path: string) => {
+    const is_past = /\/robots\/.*limit=/.test(path);
+    if (is_past) asked.push(path);
+    if (is_past) most_open = Math.max(most_open, ++open);
+    await Promise.resolve();
+    if (is_past) open -= 1;
+    const events = path.includes('/r-1/events') ? [happened] : [];
+    return new Response(JSON.stringify({ events, commands: [], runs: [], fluids: [] }));
+  });
+  for (const [size, requests] of [
+    [2, 4],
+    [20, 2],
+  ] as const) {
+    asked.length = 0;
+    const socket = new FakeSocket();
+    const session = new Session({ open_socket: () => socket, set_timer: () => 0, clear_timer: () => undefined });
+    session.link.start();
+    const robots = Array.from({ length: size }, (_, n) => robot(`r-${n + 1}`, 'connected'));
+    socket.say({ type: 'welcome', actor: 'session:1', version: '', utc_us: 0, stamp_us: 0, robots });
+    await vi.waitFor(() => expect(asked).toHaveLength(requests));
+    await vi.waitFor(() => expect(session.store.log.value.map((line) => line.event?.kind)).toContain('mode_changed'));
+  }
+  expect(most_open).toBe(1); // a stop by HTTP waits behind none of them
+});
+
+test('a past that could not be read is noted', async () => {
+  const session = session_beside(robot('a', 'connected'));
+  await (session as unknown as { load_log(): Promise<void> }).load_log();
+  session.store.refresh();
+  expect(session.store.log.value[0]?.note).toContain('could not be read');
 });
 
 test('of two looks at the recording the one that was asked for last counts, whichever comes last', () => {

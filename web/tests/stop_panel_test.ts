@@ -12,6 +12,7 @@ import { fake_document, FakeNode } from './fake_dom';
 
 beforeEach(() => {
   vi.useFakeTimers();
+  fake_document.activeElement = null;
   vi.stubGlobal('document', fake_document);
   vi.stubGlobal('window', globalThis);
   for (const name of ['addEventListener', 'removeEventListener']) vi.stubGlobal(name, () => undefined);
@@ -129,4 +130,18 @@ test('a stop that would not work now says so, and can be pressed all the same', 
 test('it is called a stop function, not an emergency-stop device', () => {
   const { page } = drawn_with(latched('A'));
   expect(page.find('show-stop-note')!.text).toBe('A stop function, not an emergency-stop device');
+});
+
+test('a latch that is cleared by a key leaves the focus below the stop button, and on no button', async () => {
+  const { page, cleared, receive } = drawn_with(latched('7'));
+  const button = page.find('clear-emergency')!;
+  button.focus();
+  button.fire('KeyDown', { key: ' ', repeat: false });
+  await vi.advanceTimersByTimeAsync(kGuard_ms + 100);
+  expect(cleared).toEqual(['7']);
+  expect(page.contains(fake_document.activeElement)).toBe(true);
+  receive({ ...latched('7'), mode: 'manual', emergency_id: null });
+  await vi.advanceTimersByTimeAsync(100);
+  expect(page.find('latch')).toBeNull();
+  expect(fake_document.activeElement?.attributes['class']).toBe('stop-below');
 });

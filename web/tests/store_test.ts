@@ -9,8 +9,8 @@ const robot = (robot_id: string, change: Partial<RobotState> = {}) =>
   ({ robot_id, link: 'connected', mode: 'manual', sub_state: 'none', emergency_id: null, ...change }) as RobotState;
 
 function store_with(...robots: RobotState[]) {
-  const clock = { page: 0 };
-  const store = new Store({ page_ms: () => clock.page, utc_ms: () => 1_700_000_000_000 });
+  const clock = { page: 0, utc: 1_700_000_000_000 };
+  const store = new Store({ page_ms: () => clock.page, utc_ms: () => clock.utc });
   store.receive({ type: 'welcome', actor: 'session:1', version: '', utc_us: 0, stamp_us: 0, robots });
   return { store, clock };
 }
@@ -201,6 +201,34 @@ test('a log brings events and commands together; of each command one line stays'
   ]);
 });
 
+test('what happened before stands in the log by its time, once, and nothing that is newer is taken back', () => {
+  const { store } = store_with(robot('rheo-1'));
+  const command = (n: number, state: CommandRecord['state'], change: Partial<CommandRecord> = {}) =>
+    ({ command_id: String(n), robot_id: 'rheo-1', state, submitted_at_us: n * 1000, ...change }) as CommandRecord;
+  const event = (n: number, change: Partial<EventRecord> = {}) => event_at(n, { received_at_us: n * 1000, ...change });
+  store.receive({ type: 'event', event: event(4) });
+  store.receive({ type: 'command', command: command(5, 'sent') });
+  store.receive({ type: 'command', command: command(6, 'sent') });
+  const asked_at = store.mark_log();
+  store.receive({ type: 'command', command: command(6, 'verified') }); // since then
+  const latch = event(1, { kind: 'emergency', emergency_id: '77' });
+  const listed = [5, 6].map((n) => command(n, 'acknowledged'));
+  const lease = command(3, 'acknowledged', { kind: 'renew_lease' });
+  store.take_past([event(4), latch], [...listed, command(2, 'verified'), lease], asked_at);
+  expect(store.log.value.map((line) => [line.at_ms, line.command?.state ?? line.event?.kind])).toEqual([
+    [6, 'verified'],
+    [5, 'acknowledged'], // it went on while this page was cut off
+    [4, 'mode_changed'],
+    [2, 'verified'],
+    [1, 'emergency'],
+  ]);
+  expect(store.latches.is_known('77')).toBe(true);
+  const many = Array.from({ length: 2 * kLogLines }, (_, n) => event(100 + n));
+  store.take_past(many, [], store.mark_log());
+  expect(store.log.value).toHaveLength(kLogLines);
+  expect(store.log.value[0]?.at_ms).toBe(100 + 2 * kLogLines - 1);
+});
+
 test('dropped messages are said', () => {
   const { store } = store_with(robot('rheo-1'));
   store.receive({ type: 'dropped', count: 12 });
@@ -261,6 +289,22 @@ test('what was not asked for is not missing afterwards', () => {
   store.receive(batch(500, 5));
   store.refresh();
   expect(store.find('rheo-1')!.readout.value).toMatchObject({ received: 5, missing: 0 });
+});
+
+test('the time of a latch is known only of one that this page saw begin', () => {
+  const latched = { mode: 'emergency', emergency_id: '7' } as const;
+  const { store, clock } = store_with(robot('a', latched), robot('b'));
+  const name = (id: string) => store.latches.name(id, 'operator');
+  const since = name('7');
+  expect(since).toMatch(/^operator, before /);
+  clock.utc += 60_000;
+  store.receive({ type: 'robot', robot: robot('a', latched) }); // ten a second
+  expect(name('7')).toBe(since);
+  store.receive({ type: 'robot', robot: robot('b', { mode: 'emergency', emergency_id: '8' }) });
+  expect(name('8')).not.toContain('before');
+  store.receive({ type: 'robot', robot: robot('c', { mode: 'emergency', emergency_id: '9' }) }); // not known until now
+  store.receive({ type: 'robot', robot: robot('c', { mode: 'emergency', emergency_id: '9' }) });
+  expect(name('9')).toContain('before');
 });
 
 test('what is known of a robot that is not watched is old while the page is cut off', () => {

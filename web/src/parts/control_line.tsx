@@ -6,10 +6,12 @@ import { useCloseOnEscape } from '../keys';
 import type { Robot } from '../robot';
 import type { Session } from '../session';
 import { GuardedButton } from './hold_button';
+import { useKeptFocus } from './kept_focus';
 import { OutcomeLine, useAsking } from './request';
 
 export function ControlLine({ session, robot }: { session: Session; robot: Robot }) {
   const asking = useAsking();
+  const root = useKeptFocus();
   const { robot_id, control } = robot.state.value;
   const me = session.store.actor.value;
   const is_current = session.store.is_current.value;
@@ -31,6 +33,9 @@ export function ControlLine({ session, robot }: { session: Session; robot: Robot
     <div
       class={`control-line ${is_mine ? 'mine' : control && is_current ? 'other' : 'free'}`}
       id="control-line"
+      ref={root}
+      role="group"
+      aria-label="Who is in control"
       data-holder={is_current ? (control?.holder ?? '') : ''}
     >
       <p>

@@ -6,6 +6,7 @@ import type { Robot } from '../robot';
 import { format, route } from '../route';
 import type { Session } from '../session';
 import { GuardedButton } from './hold_button';
+import { useKeptFocus } from './kept_focus';
 import { OutcomeLine, useAsking } from './request';
 
 // SAFETY: only the actor in control may clear, and only on a picture that is current; the station checks it again.
@@ -20,6 +21,7 @@ export function may_clear(session: Session, robot: Robot): boolean {
 
 export function Latch({ session, robot }: { session: Session; robot: Robot }) {
   const asking = useAsking();
+  const root = useKeptFocus();
   const { robot_id, emergency_cause, pending_stop, link } = robot.state.value;
   const { emergency_id, mode, stale, sample_age_ms } = robot.readout.value;
   const known_id = emergency_id ?? robot.state.value.emergency_id;
@@ -33,7 +35,7 @@ export function Latch({ session, robot }: { session: Session; robot: Robot }) {
     if (is_cleared) session.emergency.cleared(robot_id, press);
   };
   return (
-    <div class="latch" id="latch" data-emergency-id={known_id ?? ''}>
+    <div class="latch" id="latch" ref={root} data-emergency-id={known_id ?? ''}>
       <h2>{mode === 'emergency' ? 'Latched: the motor stays off' : 'Stop not acknowledged yet'}</h2>
       <p class="latch-name">
         <b>{robot_id}</b> {mode === 'emergency' ? name || 'cause not known yet' : 'operator'}

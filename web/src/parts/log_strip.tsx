@@ -100,8 +100,23 @@ export function arguments_text({ execute_at_robot_us: at_us, ...values }: Record
     .map(([name, value]) => {
       if (typeof value === 'number' && name.endsWith('_m')) return ` ${millimetres(value)} mm`;
       if (typeof value === 'number' && name === 'duty') return ` ${percent(value)} %`;
-      return name === 'emergency_id' ? ` …${String(value).slice(-6)}` : ` ${String(value)}`;
+      if (name === 'emergency_id') return ` …${String(value).slice(-6)}`;
+      return typeof value === 'object' && value !== null ? nested_text(name, value) : ` ${shortened(String(value))}`;
     })
     .join('');
   return others + at;
 }
+
+const kTick_s = 0.01; // of a schedule: docs/api.md
+const kLongest = 60; // characters of one value
+
+// A line has room for how much it is, not for all that is in it.
+function nested_text(name: string, value: object): string {
+  if (!Array.isArray(value)) return ` ${words(name)} ${shortened(JSON.stringify(value))}`;
+  const last: unknown = value.at(-1);
+  const tick = last !== null && typeof last === 'object' && 'tick' in last ? Number(last.tick) : NaN;
+  if (name !== 'schedule' || !Number.isFinite(tick)) return ` ${words(name)}: ${value.length}`;
+  return ` ${value.length} ${value.length === 1 ? 'duty' : 'duties'} over ${(tick * kTick_s).toFixed(2)} s`;
+}
+
+const shortened = (text: string) => (text.length <= kLongest ? text : `${text.slice(0, kLongest - 1)}…`);
