@@ -143,6 +143,15 @@ export class TraceWindow {
     return Math.max((value[0] as number) - (low[0] as number), (high[1] as number) - (value[1] as number));
   }
 
+  // The farthest that the band of an estimate reaches from it in all that is drawn.
+  largest_spread(): number {
+    let largest = 0;
+    for (let row = 0; row < this.size; ++row) {
+      if (this.bin_row[row] === row) largest = Math.max(largest, this.spread_at(row) ?? 0);
+    }
+    return largest;
+  }
+
   private clear(): void {
     this.size = 0;
     this.bin = NaN;
