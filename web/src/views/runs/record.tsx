@@ -85,7 +85,7 @@ function Completeness({ run, certificate }: { run: Run; certificate: Certificate
 
 // Of a run whose robot does not come back, for admins.
 export function GiveUp({ api, page, run }: { api: RunsApi; page: RunPage; run: Run }) {
-  const asking = useAsking();
+  const asking = useAsking('station');
   const certificate = page.certificate.value;
   const missing = certificate && !certificate.final ? certificate.samples_missing : 0;
   if (run.state === 'discarded' || (missing === 0 && asking.outcome.value.phase === 'idle')) return null;
@@ -113,7 +113,7 @@ export function GiveUp({ api, page, run }: { api: RunsApi; page: RunPage; run: R
 }
 
 function Said({ api, page, run }: { api: RunsApi; page: RunPage; run: Run }) {
-  const asking = useAsking();
+  const asking = useAsking('station');
   const name = useSignal<string | null>(null); // null: as it is
   const notes = useSignal<string | null>(null);
   const verdict = useSignal<string | null>(null);
@@ -175,7 +175,7 @@ function Said({ api, page, run }: { api: RunsApi; page: RunPage; run: Run }) {
 }
 
 function NewMarker({ api, page, run }: { api: RunsApi; page: RunPage; run: Run }) {
-  const asking = useAsking();
+  const asking = useAsking('station');
   const text = useSignal('');
   const at_s = page.picked_s.value;
   if (at_s === null) return <p class="quiet">Click on a plot to put a marker there.</p>;
