@@ -94,3 +94,13 @@ test('a window that ends before it begins is not fitted; both of its ends are ta
   button().fire('Click');
   expect(asked).toEqual([expect.objectContaining({ run_id: 3, from_s: 30, to_s: 40 })]);
 });
+
+test('what is being typed in one field outlives that another one is taken', async () => {
+  const { page, type } = await step();
+  page.find('design-limit')!.fire('Input', { currentTarget: { value: '6' } });
+  await type('design-to', '25');
+  expect(page.find('design-limit')!.attributes['value']).toBe('6');
+  page.find('design-limit')!.fire('Input', { currentTarget: { value: 'x' } });
+  await type('design-to', '26');
+  expect(page.find('design-limit')!.attributes['value']).toBe('x');
+});

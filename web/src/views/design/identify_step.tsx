@@ -1,7 +1,7 @@
 // Step 2: a model from the runs. The station searches; the page shows how far it is, and what came of it.
 
 import { useSignal } from '@preact/signals';
-import { useEffect } from 'preact/hooks';
+import { useEffect, useLayoutEffect } from 'preact/hooks';
 import { Choice } from '../../parts/choice';
 import { useActs } from '../experiments/acts';
 import { change_design, kLimit, kStructures, with_plant, type Design, type Structure } from './address';
@@ -172,7 +172,9 @@ type Times = ReturnType<typeof useTimes>;
 function useTimes(design: Design) {
   const known = texts_of(design);
   const typed = useSignal<Partial<Record<TimeField, string>>>({}); // an answer that comes meanwhile leaves it alone
-  useEffect(() => void (typed.value = {}), [known.from, known.to, known.limit]);
+  // What is taken of one field leaves alone what is being typed in another.
+  for (const field of ['from', 'to', 'limit'] as const)
+    useLayoutEffect(() => void (typed.value = { ...typed.peek(), [field]: known[field] }), [known[field]]);
   const texts = { ...known, ...typed.value };
   const found = times_of(texts);
   return {
