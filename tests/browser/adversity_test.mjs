@@ -83,8 +83,12 @@ async function agree(who) {
 }
 
 async function only_commands(page, other, setpoint_mm) {
+  // The page of the other does not offer it, also by Enter, and the station refuses it from anybody else.
+  await other.locator('#send-setpoint:disabled').waitFor();
   await enter_setpoint(other, setpoint_mm + 5);
-  await other.locator('#setpoint-outcome.failed').waitFor();
+  const asked = { kind: 'set_mode', mode: 'auto', setpoint_m: (setpoint_mm + 5) / 1000 };
+  const { status, answer } = await bench.post(`/robots/${kRobot}/commands`, asked);
+  assert.deepEqual([status, answer.reason], [409, 'not_in_control']);
   await until('who is in control commands', async () => {
     await enter_setpoint(page, setpoint_mm);
     await page.locator('#setpoint-outcome:is(.done, .failed)').waitFor();

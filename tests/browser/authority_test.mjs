@@ -39,7 +39,7 @@ const steps = {
     assert.equal(await holder(), '');
   },
 
-  async 'who commands takes control, and the other is refused'() {
+  async 'who commands takes control, and the other is not offered to command'() {
     await enter_setpoint(anna, 40);
     await until('anna is in control', async () => {
       // A machine that stood still for 400 ms has the command refused, as it must be; then it is given again.
@@ -47,8 +47,10 @@ const steps = {
       return (await control(anna).innerText()).includes('You are in control');
     });
     await until('ben sees who is', async () => /anna.*is in control/.test(await control(ben).innerText()));
-    await enter_setpoint(ben, -300);
-    await ben.locator('#setpoint-outcome.failed').waitFor();
+    await ben.locator('#send-setpoint:disabled').waitFor();
+    assert.match(await ben.locator('#setpoint-reason').innerText(), /anna.*is in control/);
+    await enter_setpoint(ben, -300); // by Enter
+    assert.equal(await ben.locator('#setpoint-outcome').innerText(), '');
     const now = await robot();
     assert.ok(Math.abs(now.setpoint_m - 0.04) < 1e-6, `the setpoint is still anna's: ${now.setpoint_m}`);
   },

@@ -8,7 +8,7 @@ import uPlot from 'uplot';
 import { paint_band, paint_trace, type Pen, type Plane } from './plots/trace_painter';
 import type { TraceWindow } from './plots/trace_window';
 import { clock_label, clock_splits, type Stretch } from './plots/time_axis';
-import { next_range, range_splits } from './range';
+import { is_cut, kNoExtent, next_range, range_splits, with_band, type Extent } from './range';
 import type { AnyColumn } from './samples';
 
 export interface Trace {
@@ -18,7 +18,7 @@ export interface Trace {
   dash_px?: number[];
 }
 
-// A surface between two columns, drawn below all traces; the range does not follow it.
+// A surface between two columns, drawn below all traces; the range follows it as far as the traces stay readable.
 export interface Band {
   low: AnyColumn;
   high: AnyColumn;
@@ -54,12 +54,13 @@ const kLabel_px = 110; // room that a clock time takes
 
 export class StripChart {
   private plot: uPlot;
-  private range: [number, number];
+  private range: Extent;
+  cuts_band = false; // in the range that was drawn last
   private view: Stretch = { from_s: 0, to_s: 1 };
   private is_live = true;
   private zone_s = 0;
   private readonly at: number[]; // of each series, its column in the window
-  private readonly edges: number; // that are not ranged
+  private readonly edges: number; // of the band
   private readonly observer: ResizeObserver;
 
   constructor(
@@ -87,11 +88,15 @@ export class StripChart {
     const { window, options } = this;
     Object.assign(this, { view, is_live, zone_s });
     if (!options.fixed_range) {
-      const ranged = this.at.slice(this.edges);
-      const more = options.backdrop?.range(view) ?? [Infinity, -Infinity];
-      const low = Math.min(more[0], ...ranged.map((c) => window.low[c] as number));
-      const high = Math.max(more[1], ...ranged.map((c) => window.high[c] as number));
-      this.range = next_range(this.range, low, high, options.least_span ?? 1);
+      const extent = (columns: number[], more: Extent = kNoExtent): Extent => [
+        Math.min(more[0], ...columns.map((c) => window.low[c] as number)),
+        Math.max(more[1], ...columns.map((c) => window.high[c] as number)),
+      ];
+      const least_span = options.least_span ?? 1;
+      const band = extent(this.at.slice(0, this.edges));
+      const traces = extent(this.at.slice(this.edges), options.backdrop?.range(view) ?? kNoExtent);
+      this.range = next_range(this.range, ...with_band(traces, band, least_span), least_span);
+      this.cuts_band = is_cut(this.range, band);
     }
     this.plot.batch(() => {
       this.plot.setScale('x', { min: view.from_s, max: view.to_s });

@@ -21,6 +21,9 @@ export const kSpread_sd = 2;
 // Of an estimate, as "± 1.6".
 export const plus_minus = (sd_m: number | null | undefined) =>
   `± ${millimetres(sd_m === null || sd_m === undefined ? null : kSpread_sd * sd_m)}`;
+// Beside a plot whose axis does not show all of the band; the distance from the estimate to its edge, at most.
+export const band_cut_text = (spread_m: number) => `± cut at the edge: up to ± ${millimetres(spread_m, 0)} mm`;
+
 export const millimetres_per_s = (velocity_m_s: number | null | undefined) => scaled(velocity_m_s, 1e3, 1);
 export const percent = (duty: number | null | undefined, decimals = 1) => scaled(duty, 100, decimals);
 export const millivolts = (value_mv: number | null | undefined) => scaled(value_mv, 1, 1);

@@ -1,4 +1,24 @@
-// Ranges of scales with round ends.
+// Ranges of scales with round ends, and how much of a band they show.
+
+export type Extent = [number, number]; // least and largest value; the least is the larger one where there is none
+
+const kMostSpans = 5; // of the traces, that a range with a band has at most
+
+// What a range holds of traces and of the band of ± 2 sd around them. A band that the axis cuts off looks smaller than it
+// is, or one-sided, so that the range follows it as well. But one that is huge, as at the end of a long drive by hand,
+// would flatten the traces to a line: they keep a fifth of the height, and the plot says in words that the band is cut.
+export function with_band(traces: Extent, band: Extent, least_span: number): Extent {
+  const beside = ((kMostSpans - 1) / 2) * Math.max(traces[1] - traces[0], least_span);
+  if (!(traces[1] >= traces[0]) || !(band[1] >= band[0])) return traces;
+  return [
+    Math.min(traces[0], Math.max(band[0], traces[0] - beside)),
+    Math.max(traces[1], Math.min(band[1], traces[1] + beside)),
+  ];
+}
+
+export const is_cut = (range: Extent, band: Extent) => band[0] < range[0] || band[1] > range[1];
+
+export const kNoExtent: Extent = [Infinity, -Infinity];
 
 // A range with round ends that holds [low, high] and does not tremble: it grows at once, and shrinks only when the data
 // fill less than half of it.

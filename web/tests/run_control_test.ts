@@ -45,6 +45,7 @@ async function drawn(are_runs_known = true) {
   const session = {
     store,
     utc_us: () => 0,
+    phase: signal('live'),
     fluids: signal(null),
     me: signal({ role: 'operator' }),
     settings: { dismissed: { names: signal(new Set<string>()) } },

@@ -1,5 +1,6 @@
 // Auto: the setpoint in millimetres, and the key that engages it.
 
+import { why_no_command } from '../command_reason';
 import { draft_of } from '../drafts';
 import { m_to_millimetres, millimetres, millimetres_to_m, parse_millimetres } from '../format';
 import type { Session } from '../session';
@@ -9,12 +10,13 @@ import { OutcomeLine, useAsking } from './request';
 const kSteps_mm = [-10, -1, 1, 10];
 
 export function AutoControl({ session, robot }: { session: Session; robot: Robot }) {
-  const { robot_id, link } = robot.state.value;
+  const { robot_id } = robot.state.value;
   const { mode, setpoint_m } = robot.readout.value;
   const draft = draft_of(session, robot_id, 'setpoint');
   const asking = useAsking();
   const in_auto = mode === 'auto';
-  const possible = link === 'connected' && mode !== 'emergency';
+  const reason = why_no_command(session, robot);
+  const possible = reason === '' && mode !== 'emergency';
   // Until something is typed: the setpoint in force, if there is one.
   const typed = draft.value ?? (in_auto && setpoint_m !== null ? millimetres(setpoint_m) : '100.0');
   const wanted_m = parse_millimetres(typed);
@@ -72,10 +74,22 @@ export function AutoControl({ session, robot }: { session: Session; robot: Robot
           </span>
           {kSteps_mm.slice(2).map(step_button)}
         </div>
-        <button type="submit" class="primary" id="send-setpoint" disabled={!possible || asking.pending}>
+        <button
+          type="submit"
+          class="primary"
+          id="send-setpoint"
+          disabled={!possible || asking.pending}
+          title={reason}
+          aria-describedby={reason === '' ? undefined : 'setpoint-reason'}
+        >
           {in_auto ? 'Send setpoint' : 'Engage auto at this setpoint'}
         </button>
       </form>
+      {reason !== '' && (
+        <p class="quiet" id="setpoint-reason">
+          {reason}
+        </p>
+      )}
       <OutcomeLine asking={asking} id="setpoint-outcome" />
     </fieldset>
   );

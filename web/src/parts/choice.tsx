@@ -62,10 +62,11 @@ interface ChoiceProps {
   options: readonly Option[];
   value: string;
   disabled?: boolean;
+  title?: string;
   on_choose(value: string): void;
 }
 
-export function Choice({ id, label, options, value, disabled = false, on_choose }: ChoiceProps) {
+export function Choice({ id, label, options, value, disabled = false, title = '', on_choose }: ChoiceProps) {
   const chosen = Math.max(
     0,
     options.findIndex((option) => option.value === value),
@@ -119,6 +120,7 @@ export function Choice({ id, label, options, value, disabled = false, on_choose 
         aria-controls={`${id}-list`}
         aria-activedescendant={open.value ? option_id(at.value) : undefined}
         disabled={disabled}
+        title={title}
         onClick={() => (open.value ? close() : go(chosen))}
         onKeyDown={on_key}
         onKeyUp={(event) => event.key === ' ' && event.preventDefault()}

@@ -1,5 +1,6 @@
 // A disturbance: the robot adds a length to the position that its controller sees, as in Figure 7 of the paper.
 
+import { why_no_command } from '../command_reason';
 import { draft_of } from '../drafts';
 import { millimetres, parse_millimetres } from '../format';
 import type { Robot } from '../robot';
@@ -7,17 +8,18 @@ import type { Session } from '../session';
 import { OutcomeLine, useAsking } from './request';
 
 export function DisturbanceControl({ session, robot }: { session: Session; robot: Robot }) {
-  const { robot_id, link } = robot.state.value;
+  const { robot_id } = robot.state.value;
   const { mode, disturbance_m } = robot.readout.value;
   const draft = draft_of(session, robot_id, 'disturbance');
   const typed = draft.value ?? '\u221250.0';
   const asking = useAsking();
-  const possible = link === 'connected' && mode === 'auto' && !asking.pending;
+  const reason = why_no_command(session, robot);
+  const possible = reason === '' && mode === 'auto' && !asking.pending;
   const wanted_m = parse_millimetres(typed);
   const is_disturbed = disturbance_m !== null && disturbance_m !== 0;
 
   const inject = (length_m: number | null) => {
-    if (link !== 'connected' || mode !== 'auto') return;
+    if (reason !== '' || mode !== 'auto') return;
     if (length_m === null) return asking.fail(`“${typed}” is not a length in millimetres.`);
     const what = length_m === 0 ? 'No disturbance' : `Disturbance of ${millimetres(length_m)} mm`;
     void asking.ask(what, () => session.api.inject_disturbance(robot_id, length_m));
@@ -48,10 +50,16 @@ export function DisturbanceControl({ session, robot }: { session: Session; robot
             />
             <span class="unit">mm</span>
           </span>
-          <button type="submit" id="inject-disturbance" disabled={!possible}>
+          <button type="submit" id="inject-disturbance" disabled={!possible} title={reason}>
             Inject
           </button>
-          <button type="button" id="end-disturbance" disabled={!possible || !is_disturbed} onClick={() => inject(0)}>
+          <button
+            type="button"
+            id="end-disturbance"
+            disabled={!possible || !is_disturbed}
+            title={reason}
+            onClick={() => inject(0)}
+          >
             End it
           </button>
         </div>

@@ -10,6 +10,7 @@ interface HeldProps {
   on_release(): void;
   children: preact.ComponentChildren;
   described_by?: string;
+  title?: string;
   id?: string;
 }
 
@@ -40,6 +41,7 @@ export function HeldButton({ on_press, on_release, disabled = false, children, d
       id={id}
       class={rest.class}
       disabled={disabled}
+      title={rest.title}
       aria-describedby={described_by}
       onPointerDown={(event) => {
         if (event.button !== 0) return;

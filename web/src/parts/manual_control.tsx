@@ -1,5 +1,6 @@
 // Manual: a duty that runs while the key is held, the way back from auto, and zeroing of the position.
 
+import { why_no_command } from '../command_reason';
 import { draft_of } from '../drafts';
 import { percent, percent_to_duty } from '../format';
 import type { Session } from '../session';
@@ -16,9 +17,13 @@ export function ManualControl({ session, robot }: { session: Session; robot: Rob
   const asking = useAsking();
   const in_manual = mode === 'manual';
   const connected = link === 'connected';
-  const possible = connected && in_manual && session.phase.value === 'live';
+  const reason = why_no_command(session, robot);
   const held = session.held.value;
   const running = held.robot_id === robot_id;
+  // A duty that runs is ended by its own rules (session.hold), not by a button that is disabled under the hand because the
+  // page was late for a moment.
+  const drivable = connected && in_manual && session.phase.value === 'live';
+  const may_hold = drivable && (running || reason === '');
 
   return (
     <fieldset class={`control manual ${in_manual ? 'engaged' : ''}`}>
@@ -28,7 +33,8 @@ export function ManualControl({ session, robot }: { session: Session; robot: Rob
           type="button"
           class="primary"
           id="to-manual"
-          disabled={!connected || asking.pending}
+          disabled={reason !== '' || asking.pending}
+          title={reason}
           onClick={() => void asking.ask('Manual', () => session.api.set_manual(robot_id))}
         >
           Switch to manual, motor off
@@ -60,7 +66,8 @@ export function ManualControl({ session, robot }: { session: Session; robot: Rob
         <HeldButton
           id="hold-to-run"
           class={`hold-to-run ${running ? 'running' : ''}`}
-          disabled={!possible}
+          disabled={!may_hold}
+          title={reason}
           described_by="hold-outcome"
           on_press={() => session.hold.press(robot_id, percent_to_duty(duty_percent))}
           on_release={() => session.hold.release()}
@@ -70,8 +77,8 @@ export function ManualControl({ session, robot }: { session: Session; robot: Rob
         <button
           type="button"
           id="zero-position"
-          disabled={!possible || duty !== 0 || asking.pending}
-          title="Only at duty 0"
+          disabled={!drivable || reason !== '' || duty !== 0 || asking.pending}
+          title={reason || 'Only at duty 0'}
           onClick={() => void asking.ask('Zero position', () => session.api.zero_position(robot_id))}
         >
           Zero position
@@ -80,7 +87,7 @@ export function ManualControl({ session, robot }: { session: Session; robot: Rob
       <GamepadLine
         session={session}
         robot_id={robot_id}
-        why_not={possible ? '' : connected && !in_manual ? 'it acts in manual.' : 'the robot cannot be driven now.'}
+        why_not={may_hold ? '' : connected && !in_manual ? 'it acts in manual.' : 'the robot cannot be driven now.'}
         full_duty={percent_to_duty(duty_percent)}
       />
       {(held.error || held.lapsed) && (

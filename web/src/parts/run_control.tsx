@@ -3,6 +3,7 @@
 import { useSignal, type Signal } from '@preact/signals';
 import { useEffect } from 'preact/hooks';
 import type { RunRecord } from '../api';
+import { why_no_command } from '../command_reason';
 import { clock_time, duration, fluid_text } from '../format';
 import type { Robot } from '../robot';
 import type { Session } from '../session';
@@ -90,6 +91,7 @@ function RunForm({ session, robot, name, disabled, on_start, on_fluid }: RunForm
   const listed = session.fluids.value;
   const known = robot.state.value.fluid ?? '';
   const fluid = picked.value ?? known;
+  const reason = listed ? why_no_command(session, robot) : ''; // without a list it is of the run alone
   const names = [...new Set([...(listed?.map((each) => each.fluid) ?? kBuiltInFluids), known])].filter(
     (name) => name !== '',
   );
@@ -121,7 +123,15 @@ function RunForm({ session, robot, name, disabled, on_start, on_fluid }: RunForm
         value={name.value ?? ''}
         onInput={(event) => (name.value = event.currentTarget.value)}
       />
-      <Choice id="run-fluid" label="Fluid" options={options} value={fluid} on_choose={pick} />
+      <Choice
+        id="run-fluid"
+        label="Fluid"
+        options={options}
+        value={fluid}
+        disabled={reason !== ''}
+        title={reason}
+        on_choose={pick}
+      />
       <button type="submit" id="start-run" disabled={disabled}>
         Start run
       </button>

@@ -54,6 +54,11 @@ export class Deck {
     this.charts.push(new StripChart(host, options, this.window, is_last, painters, () => this.mark_dirty()));
   }
 
+  // Of the strip with that number.
+  cuts_band(at: number): boolean {
+    return this.charts[at]?.cuts_band ?? false;
+  }
+
   mark_dirty(): void {
     this.is_dirty = true;
   }

@@ -4,7 +4,7 @@
 
 import { signal, type Signal } from '@preact/signals';
 import { kAxis_px } from '../chart';
-import { kSpread_sd, plus_minus } from '../format';
+import { band_cut_text, kSpread_sd, plus_minus } from '../format';
 import type { SampleRows } from '../samples';
 import type { LogLine } from '../store';
 import { Deck } from './deck';
@@ -36,6 +36,7 @@ export interface SceneSource {
 export abstract class Scene {
   readonly note = signal('');
   readonly texts = new Map<string, Signal<string>>(); // of the cursor, by strip
+  readonly cuts = new Map<string, Signal<string>>(); // what is said of a band that is cut, by strip
   readonly has_predicted = signal(false); // in what is shown
   readonly marks: Marks;
   readonly predictions = new PredictedBackdrop();
@@ -136,11 +137,20 @@ export abstract class Scene {
 
   private on_drawn(): void {
     this.place_line();
+    this.note_cuts();
     for (const told of this.drawn) told();
     const now_ms = performance.now();
     if (now_ms - this.told_at_ms < kCursor_ms) return;
     this.told_at_ms = now_ms;
     this.tell();
+  }
+
+  private note_cuts(): void {
+    const { deck, strips, cuts } = this;
+    strips.forEach((strip, at) => {
+      const text = cuts.get(strip.name);
+      if (text) text.value = deck?.cuts_band(at) ? band_cut_text(deck.window.largest_spread()) : '';
+    });
   }
 
   private point(at_px: number | null): void {

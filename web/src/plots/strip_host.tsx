@@ -67,7 +67,9 @@ const x_in = (event: MouseEvent, host: Element) => event.clientX - host.getBound
 
 function StripFigure({ strip, at, is_last, scene }: { strip: Strip; at: number; is_last: boolean; scene: Scene }) {
   const text = useSignal('');
+  const cut = useSignal('');
   scene.texts.set(strip.name, text);
+  scene.cuts.set(strip.name, cut);
   const traces = strip.traces.length > 1 || strip.name === 'position' ? [...strip.traces].reverse() : [];
   const keys = strip.has_predicted && scene.has_predicted.value ? [...traces, kPredicted] : traces;
   const name = strip.name.startsWith('=') ? 'derived' : strip.name;
@@ -82,6 +84,7 @@ function StripFigure({ strip, at, is_last, scene }: { strip: Strip; at: number; 
             </span>
           ))}
         </span>
+        <span class="band-cut">{cut}</span>
         <output class="cursor">{text}</output>
       </figcaption>
       <div class="plot" />

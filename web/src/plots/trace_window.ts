@@ -143,6 +143,15 @@ export class TraceWindow {
     return Math.max((value[0] as number) - (low[0] as number), (high[1] as number) - (value[1] as number));
   }
 
+  // The farthest that the band of an estimate reaches from it in all that is drawn.
+  largest_spread(): number {
+    let largest = 0;
+    for (let row = 0; row < this.size; ++row) {
+      if (this.bin_row[row] === row) largest = Math.max(largest, this.spread_at(row) ?? 0);
+    }
+    return largest;
+  }
+
   private clear(): void {
     this.size = 0;
     this.bin = NaN;
@@ -195,7 +204,7 @@ export class TraceWindow {
       if (!(least <= most)) continue; // it has no value here
       if (!seen[c]) {
         seen[c] = true;
-        rises[c] = true;
+        rises[c] = this.rises_to(c, least, most);
         min[c] = least;
         max[c] = most;
         continue;
@@ -210,6 +219,16 @@ export class TraceWindow {
       }
     }
     if (this.bin_s === 0) this.flush();
+  }
+
+  // Of a point of which only the extremes are known: as the trace goes from the bin before to it. Their middles decide and
+  // not where the trace ended, or one order would turn all that follow, and a plot that runs would shimmer.
+  private rises_to(c: number, least: number, most: number): boolean {
+    const values = this.values[c] as Float64Array;
+    const last = this.size - 1;
+    if (last < 0) return true;
+    const before = (values[this.bin_row[last] as number] as number) + (values[last] as number);
+    return !(least + most < before); // also where nothing is known before
   }
 
   private break_at(from_s: number, to_s: number): void {

@@ -2,7 +2,9 @@
 // the page, never later.
 
 import { useComputed } from '@preact/signals';
+import { useMemo } from 'preact/hooks';
 import { is_outdated } from '../page_build';
+import { PresentContext, present_of } from '../parts/request';
 import { StopPanel } from '../parts/stop_panel';
 import { TopBar } from '../parts/top_bar';
 import { format, go_to, route } from '../route';
@@ -22,33 +24,36 @@ export function open_view(key: string): boolean {
 
 export function Cockpit({ session }: { session: Session }) {
   const name = useComputed(() => route.value.view).value;
+  const present = useMemo(() => present_of(session), [session]);
   if (session.phase.value === 'signed_out') return <SignedOut session={session} />;
   const view = view_named(name);
   const module = view ? loader.of(view).value.module : null;
   const View = module?.default;
   const Hands = module?.has_hands?.(route.value) === false ? undefined : module?.Hands;
   return (
-    <div class={`cockpit ${name === 'robot' ? 'of-robot' : 'of-view'}`}>
-      <TopBar session={session} />
-      <div class="view">
-        {View ? (
-          <View key={name} session={session} route={route.value} />
-        ) : view ? (
-          <NotLoaded session={session} view={view} />
-        ) : (
-          <NoSuchView />
-        )}
+    <PresentContext.Provider value={present}>
+      <div class={`cockpit ${name === 'robot' ? 'of-robot' : 'of-view'}`}>
+        <TopBar session={session} />
+        <div class="view">
+          {View ? (
+            <View key={name} session={session} route={route.value} />
+          ) : view ? (
+            <NotLoaded session={session} view={view} />
+          ) : (
+            <NoSuchView />
+          )}
+        </div>
+        <div class="hands">
+          <StopPanel session={session} />
+          {Hands && (
+            <section class="controls" aria-label="Controls">
+              <Hands session={session} route={route.value} />
+            </section>
+          )}
+        </div>
+        {session.cut_off.value && <div class="cut-off-frame" id="cut-off-frame" />}
       </div>
-      <div class="hands">
-        <StopPanel session={session} />
-        {Hands && (
-          <section class="controls" aria-label="Controls">
-            <Hands session={session} route={route.value} />
-          </section>
-        )}
-      </div>
-      {session.cut_off.value && <div class="cut-off-frame" id="cut-off-frame" />}
-    </div>
+    </PresentContext.Provider>
   );
 }
 

@@ -129,6 +129,23 @@ test('the "±" of a pixel is that of its estimate, however far the estimate move
   [0.02, 0.02, 0.01, 0.01].forEach((wanted, row) => expect(found[row]).toBeCloseTo(wanted, 9));
 });
 
+test('a point of which only the extremes are known is drawn the way that the trace goes, up as well as down', () => {
+  const middles = [0, 1, 2, 3, 3, 2, 1, 0]; // a rising flank, and a falling one
+  const values = (at: (middle: number) => number) => Float64Array.from(middles.map(at));
+  const first_s = Float64Array.from(middles.map((_, at) => 100 + at + 0.1));
+  const last_s = Float64Array.from(middles.map((_, at) => 100 + at + 0.9));
+  const columns = { position_m: { min: values((m) => m - 0.5), max: values((m) => m + 0.5) } };
+  const tile: Tile = { from_s: 0, to_s: 1e9, known_to_s: 1e9, first_s, last_s, columns };
+  const past = {
+    visit: (_: number, __: number, ___: number, point: (tile: Tile, at: number) => void) =>
+      first_s.forEach((____, at) => point(tile, at)),
+  };
+  const window = new TraceWindow(64, ['position_m']);
+  window.fill({ ring: new SampleRing(8), shift_s: 0, past }, { from_s: 100, to_s: 108 }, 8);
+  const drawn = [...window.values[0]!.subarray(0, window.size)];
+  expect(drawn).toEqual([-0.5, 0.5, 0.5, 1.5, 1.5, 2.5, 2.5, 3.5, 2.5, 3.5, 2.5, 1.5, 1.5, 0.5, 0.5, -0.5]);
+});
+
 test('a ring that grows keeps what it has', () => {
   const ring = ring_of(1000);
   ring.grow(65_536);

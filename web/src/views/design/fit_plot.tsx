@@ -82,8 +82,8 @@ function Traces({ traces, run_id }: { traces: FitTraces; run_id: number | null }
     if (shown.model) data.push({ values: shown.model, colour: '--duty', width_px: 2.5 });
     if (shown.measured) data.push({ values: shown.measured, colour: '--measured', width_px: 1 });
     const rest: PlotTrace[] = [{ values: shown.residual, colour: '--seen', width_px: 1 }];
-    plots.current[0]?.show(content(data), view.value, extremes(data));
-    plots.current[1]?.show(content(rest), view.value, extremes(rest));
+    plots.current[0]?.show(content(data), view.value, { traces: extremes(data) });
+    plots.current[1]?.show(content(rest), view.value, { traces: extremes(rest) });
   }, [traces, view.value]);
 
   const row = cursor.value === null ? -1 : nearest(traces.time_s, cursor.value);

@@ -1,7 +1,7 @@
 // Step 2: a model from the runs. The station searches; the page shows how far it is, and what came of it.
 
 import { useSignal } from '@preact/signals';
-import { useEffect } from 'preact/hooks';
+import { useEffect, useLayoutEffect } from 'preact/hooks';
 import { Choice } from '../../parts/choice';
 import { useActs } from '../experiments/acts';
 import { change_design, kLimit, kStructures, with_plant, type Design, type Structure } from './address';
@@ -10,7 +10,8 @@ import { FitResult } from './fit_result';
 import { is_at_work, type JobBody } from './jobs';
 import type { StepProps } from './parts';
 import { Step } from './step';
-import { capital, kStructureNames, number_text, state_of } from './words';
+import { is_problem, texts_of, times_of, type TimeField } from './typed_times';
+import { capital, kStructureNames, state_of } from './words';
 
 export const may_record = (session: StepProps['session']) =>
   (session.me.value?.scopes ?? '').split(',').some((scope) => scope === 'record' || scope === 'command');
@@ -42,6 +43,7 @@ export function IdentifyStep(props: StepProps) {
   const answer = work.fit.answer.value;
   const is_live = session.phase.value === 'live';
   const body = JSON.stringify(identify_body(design));
+  const fields = useTimes(design);
   // A link names the job; without one, what was found for other runs is not shown.
   useEffect(() => {
     if (!is_live) return;
@@ -72,13 +74,18 @@ export function IdentifyStep(props: StepProps) {
     >
       <div class="design-columns">
         <div>
-          <Options {...props} />
+          <Options {...props} fields={fields} />
           <button
             type="button"
             class="primary"
             id="design-identify"
             disabled={
-              !is_live || design.runs.length === 0 || is_at_work(answer.phase) || is_known || !may_record(session)
+              !is_live ||
+              design.runs.length === 0 ||
+              is_at_work(answer.phase) ||
+              is_known ||
+              fields.problem !== null ||
+              !may_record(session)
             }
             onClick={() => work.fit.ask(body, identify_body(design))}
           >
@@ -111,7 +118,7 @@ export function IdentifyStep(props: StepProps) {
   );
 }
 
-function Options({ design, runs }: StepProps) {
+function Options({ design, runs, fields }: StepProps & { fields: Times }) {
   const others = (runs.answer?.runs ?? []).filter(
     ({ run_id, state }) => state !== 'open' && !design.runs.includes(run_id),
   );
@@ -132,30 +139,13 @@ function Options({ design, runs }: StepProps) {
         />
       </div>
       <div class="design-pair">
-        <Seconds
-          id="design-from"
-          label="From, s"
-          value={design.from_s === 0 ? '' : number_text(design.from_s)}
-          placeholder="start"
-          on_value={(from_s) => change_design({ ...design, from_s: from_s ?? 0, fit: null })}
-        />
-        <Seconds
-          id="design-to"
-          label="To, s"
-          value={design.to_s === null ? '' : number_text(design.to_s)}
-          placeholder="end"
-          on_value={(to_s) => change_design({ ...design, to_s, fit: null })}
-        />
+        <Seconds field="from" label="From, s" placeholder="start" fields={fields} />
+        <Seconds field="to" label="To, s" placeholder="end" fields={fields} />
       </div>
-      <Seconds
-        id="design-limit"
-        label="Search at most, s"
-        value={design.limit_s === kLimit.usual ? '' : number_text(design.limit_s)}
-        placeholder={String(kLimit.usual)}
-        least={kLimit.from}
-        most={kLimit.to}
-        on_value={(limit_s) => change_design({ ...design, limit_s: limit_s ?? kLimit.usual, fit: null })}
-      />
+      <Seconds field="limit" label="Search at most, s" placeholder={String(kLimit.usual)} fields={fields} />
+      <p class="problem" id="design-times-problem" role="alert">
+        {fields.problem?.text ?? ''}
+      </p>
       <div>
         <span class="design-label">Validate on</span>
         <Choice
@@ -176,26 +166,35 @@ function Options({ design, runs }: StepProps) {
   );
 }
 
-// A time that a person types; Enter or leaving the field takes it.
-function Seconds(props: {
-  id: string;
-  label: string;
-  value: string;
-  placeholder: string;
-  least?: number;
-  most?: number;
-  on_value(value: number | null): void;
-}) {
-  const { id, label, value, placeholder, least = 0, most = 1e6, on_value } = props;
-  const problem = useSignal(false);
-  const draft = useSignal<string | null>(null); // what is being typed: an answer that comes meanwhile leaves it alone
-  useEffect(() => void (draft.value = null), [value]);
-  const take = (text: string) => {
-    const typed = text.trim().replace(',', '.');
-    const number = typed === '' ? null : Number(typed);
-    problem.value = number !== null && !(number >= least && number <= most);
-    if (!problem.value && typed !== value) on_value(number);
+type Times = ReturnType<typeof useTimes>;
+
+// The fields together: a window is wrong by both of its ends, and is taken when both are right.
+function useTimes(design: Design) {
+  const known = texts_of(design);
+  const typed = useSignal<Partial<Record<TimeField, string>>>({}); // an answer that comes meanwhile leaves it alone
+  // What is taken of one field leaves alone what is being typed in another.
+  for (const field of ['from', 'to', 'limit'] as const)
+    useLayoutEffect(() => void (typed.value = { ...typed.peek(), [field]: known[field] }), [known[field]]);
+  const texts = { ...known, ...typed.value };
+  const found = times_of(texts);
+  return {
+    texts,
+    problem: is_problem(found) ? found : null,
+    type: (field: TimeField, text: string) => (typed.value = { ...typed.value, [field]: text }),
+    take() {
+      const now = times_of({ ...known, ...typed.peek() });
+      if (is_problem(now)) return;
+      const is_other = (['from_s', 'to_s', 'limit_s'] as const).some((name) => now[name] !== design[name]);
+      if (is_other) change_design({ ...design, ...now, fit: null });
+      else typed.value = {};
+    },
   };
+}
+
+// A time that a person types; Enter or leaving the field takes it.
+function Seconds(props: { field: TimeField; label: string; placeholder: string; fields: Times }) {
+  const { field, label, placeholder, fields } = props;
+  const id = `design-${field}`;
   return (
     <div>
       <label class="design-label" for={id}>
@@ -206,11 +205,11 @@ function Seconds(props: {
         inputMode="decimal"
         autoComplete="off"
         placeholder={placeholder}
-        value={draft.value ?? value}
-        aria-invalid={problem.value}
-        onInput={(event) => (draft.value = event.currentTarget.value)}
-        onChange={(event) => take(event.currentTarget.value)}
-        onKeyDown={(event) => event.key === 'Enter' && take(event.currentTarget.value)}
+        value={fields.texts[field]}
+        aria-invalid={fields.problem?.field === field}
+        onInput={(event) => fields.type(field, event.currentTarget.value)}
+        onChange={() => fields.take()}
+        onKeyDown={(event) => event.key === 'Enter' && fields.take()}
       />
     </div>
   );

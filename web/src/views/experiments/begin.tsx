@@ -3,6 +3,7 @@
 import { signal, useSignal } from '@preact/signals';
 import { useEffect, useLayoutEffect, useMemo, useRef } from 'preact/hooks';
 import { ApiError } from '../../api';
+import { draft_of } from '../../drafts';
 import type { ProfileEntry } from '../../experiments_api';
 import { change_query, go_to } from '../../route';
 import type { Robot } from '../../robot';
@@ -16,7 +17,8 @@ import { Plan } from './plan';
 import { kOptions, StartPanel } from './start_panel';
 import { how_long, place_of_refusal } from './words';
 
-// What is typed outlives the view: a person who looks at the robot meanwhile finds it again.
+// What is chosen and typed outlives the view: a person who looks at the robot meanwhile finds it again. What was changed in
+// a profile is there again when it is chosen again (drafts.ts).
 const draft = signal({ profile: '', original: '', text: '' });
 const kOwn = 'own';
 const kTyping_ms = 150;
@@ -50,6 +52,8 @@ export function Begin({ session, route }: ViewProps) {
   const options = useSignal(kOptions);
   const { pending, problem, act } = useActs();
 
+  const changed_in = (profile: string) => draft_of(session, profile, 'profile_text');
+  const notes = draft_of(session, '', 'experiment_notes');
   // What was chosen last is shown, however late an earlier choice is answered.
   const chosen = useRef('');
   const choose = async (profile: string) => {
@@ -57,7 +61,7 @@ export function Begin({ session, route }: ViewProps) {
     try {
       const document = profile === kOwn ? kEmptyProfile : await session.experiments.profile(profile);
       if (chosen.current !== profile) return;
-      draft.value = { profile, original: document, text: document };
+      draft.value = { profile, original: document, text: changed_in(profile).peek() ?? document };
       station_fault.value = null;
       change_query({ profile });
     } catch (error) {
@@ -100,7 +104,7 @@ export function Begin({ session, route }: ViewProps) {
       store.keep_selected();
       const { profile, original } = draft.peek();
       const is_shipped = profile !== kOwn && original === text;
-      const { priority, is_unattended, notes } = options.peek();
+      const { priority, is_unattended } = options.peek();
       try {
         const asked_at = store.experiments.mark();
         const begun = await session.experiments.begin({
@@ -108,8 +112,9 @@ export function Begin({ session, route }: ViewProps) {
           profile: is_shipped ? profile : `${text}\n`,
           priority,
           unattended: is_unattended && plan.profile?.is_unattended === true,
-          notes,
+          notes: notes.peek() ?? '',
         });
+        notes.value = null;
         store.experiments.take_answer([begun], asked_at);
         go_to({ view: 'experiments', parts: [String(begun.experiment_id)] });
       } catch (error) {
@@ -159,6 +164,7 @@ export function Begin({ session, route }: ViewProps) {
           asked_id={asked_id}
           plan={plan}
           options={options}
+          notes={notes}
           waits={checks.some((check) => check.state === 'waits')}
           blocked={blocked_by(text, pending.value)}
           problem={problem.value}
@@ -171,7 +177,9 @@ export function Begin({ session, route }: ViewProps) {
   );
 
   function set_text(next: string): void {
-    draft.value = { ...draft.peek(), text: next };
+    const { profile, original } = draft.peek();
+    draft.value = { profile, original, text: next };
+    changed_in(profile).value = next === original ? null : next;
     station_fault.value = null;
   }
 

@@ -2,6 +2,7 @@
 
 import type { Overview } from '../../api';
 import { kSpread_sd } from '../../format';
+import type { Robot } from '../../robot';
 import type { SampleRing } from '../../samples';
 
 export interface Measured {
@@ -9,6 +10,32 @@ export interface Measured {
   position_m: number[]; // of an estimate
   low_m: number[]; // two standard deviations below and above it; NaN: not known
   high_m: number[];
+}
+
+const kPaused_s = 1; // the beginning that is reported moves so far only by a pause
+
+// Now, in the times of a robot's ring. By the robot's clock, where the station knows it: the ring is laid on page time by when
+// its first batch came, which may be some tenths of a second late.
+export const ring_now_s = (robot: Robot, utc_minus_steady_us: number | null, utc_s: number, page_now_s: number) =>
+  utc_s - robot.utc_shift_s(utc_minus_steady_us, utc_s - page_now_s);
+
+// When the run that goes on began: of what is reported of it, the report that was the least late says best. The station gives
+// the robot's time of a step only when the run has ended.
+export class RunBegin {
+  private key = '';
+  private began_s = Infinity;
+  private elapsed_s = 0;
+
+  // `key`: of the experiment and its run.
+  of(key: string, elapsed_s: number, now_s: number): number {
+    if (key !== this.key) [this.key, this.began_s, this.elapsed_s] = [key, Infinity, 0];
+    const said_s = now_s - elapsed_s;
+    const goes_on = elapsed_s > this.elapsed_s; // else its first step, or one that is repeated, is still to begin
+    if (elapsed_s < this.elapsed_s) this.began_s = Infinity;
+    this.elapsed_s = elapsed_s;
+    if (goes_on) this.began_s = said_s > this.began_s + kPaused_s ? said_s : Math.min(this.began_s, said_s);
+    return Number.isFinite(this.began_s) ? this.began_s : said_s;
+  }
 }
 
 // As far as the page has received it. Times of the ring are page time.

@@ -1,17 +1,16 @@
 // One experiment: how far it is, why it waits or has ended, what may be done with it, its runs and what was predicted.
 
 import { useComputed } from '@preact/signals';
-import { useLayoutEffect, useMemo } from 'preact/hooks';
+import { useLayoutEffect, useMemo, useRef } from 'preact/hooks';
 import type { Experiment, ExperimentRun, Prediction } from '../../experiments_api';
 import { has_ended, type ExperimentSummary } from '../../experiments_store';
 import { millimetres } from '../../format';
 import { format } from '../../route';
-import type { Robot } from '../../robot';
 import type { Session } from '../../session';
 import { useActs, useAsked } from './acts';
 import { ActsOfOne, Presence } from './acts_of_one';
 import { KnowledgePanel } from './knowledge';
-import { measured_in, measured_of, type Measured } from './measured';
+import { measured_in, measured_of, ring_now_s, RunBegin, type Measured } from './measured';
 import type { Track } from './preview';
 import { RunsTable } from './runs_table';
 import { moment_text } from './slot_time';
@@ -206,7 +205,7 @@ function RunPlot({ session, experiment, summary, run }: RunPlotProps) {
   const is_now = run !== null && summary.progress?.run === number && run.ended_at_us === null;
   const elapsed_s = is_now ? (summary.progress?.elapsed_s ?? null) : null;
   const track = useMemo(() => track_of_prediction(answer), [answer]);
-  const live = useMeasured(session.store.find(summary.robot_id), elapsed_s);
+  const live = useMeasured(session, summary.robot_id, id, elapsed_s);
   const recorded = useRecorded(session, run, track?.t_s.length ?? 0);
   const measured = live ?? recorded;
   if (!run) return null;
@@ -269,10 +268,14 @@ function useRecorded(session: Session, run: ExperimentRun | null, points: number
 }
 
 // Where the robot believed that it was since the run began, as far as this page has received it.
-function useMeasured(robot: Robot | undefined, elapsed_s: number | null): Measured | null {
-  return useMemo(
-    () =>
-      !robot || elapsed_s === null ? null : measured_of(robot.ring, performance.now() / 1000 - elapsed_s, elapsed_s),
-    [robot, elapsed_s],
-  );
+function useMeasured(session: Session, robot_id: string, id: string, elapsed_s: number | null): Measured | null {
+  const begin = useRef(new RunBegin()).current;
+  const { store, path } = session;
+  const robot = store.find(robot_id);
+  return useMemo(() => {
+    if (!robot || elapsed_s === null) return null;
+    const page_ms = performance.now();
+    const now_s = ring_now_s(robot, store.utc_minus_steady_us, path.utc_s(page_ms), page_ms / 1000);
+    return measured_of(robot.ring, begin.of(id, elapsed_s, now_s), elapsed_s);
+  }, [robot, id, elapsed_s]);
 }

@@ -11,9 +11,8 @@ import type { Plan } from './outlook';
 export interface Options {
   priority: number;
   is_unattended: boolean;
-  notes: string;
 }
-export const kOptions: Options = { priority: 0, is_unattended: false, notes: '' };
+export const kOptions: Options = { priority: 0, is_unattended: false };
 const kMostPriority = 100;
 
 interface StartPanelProps {
@@ -22,6 +21,7 @@ interface StartPanelProps {
   asked_id: string | undefined; // the robot of the address
   plan: Plan;
   options: Signal<Options>;
+  notes: Signal<string | null>; // null: none were typed
   waits: boolean; // something of the check list is not ready
   blocked: string; // why it cannot be started, '': it can
   problem: string;
@@ -30,7 +30,7 @@ interface StartPanelProps {
 }
 
 export function StartPanel(props: StartPanelProps) {
-  const { session, robot, asked_id, plan, options, waits, blocked, problem, on_start, children } = props;
+  const { session, robot, asked_id, plan, options, notes, waits, blocked, problem, on_start, children } = props;
   const { store } = session;
   const robots = store.robots.value;
   const change = (next: Partial<Options>) => (options.value = { ...options.value, ...next });
@@ -85,8 +85,8 @@ export function StartPanel(props: StartPanelProps) {
             id="experiment-notes"
             autoComplete="off"
             maxLength={4000}
-            value={options.value.notes}
-            onInput={(event) => change({ notes: event.currentTarget.value })}
+            value={notes.value ?? ''}
+            onInput={(event) => (notes.value = event.currentTarget.value)}
           />
         </div>
       </div>

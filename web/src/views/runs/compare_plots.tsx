@@ -2,12 +2,13 @@
 
 import { signal, type Signal } from '@preact/signals';
 import { useEffect, useRef } from 'preact/hooks';
-import { kSpread_sd, millimetres, millivolts, percent } from '../../format';
+import { band_cut_text, kSpread_sd, millimetres, millivolts, percent } from '../../format';
 import { go_to, route } from '../../route';
 import type { Comparison } from './alignment';
 import { RunPlot, type PlotContent, type PlotOptions } from './run_plot';
 import type { AlignedRun, AlignedRuns } from './runs_api';
 import { since_text, time_splits, time_step_s } from './time_axis';
+import { kNoExtent, type Extent } from '../../range';
 import type { Values } from './traces';
 
 const kPixelsOfALabel = 96;
@@ -115,9 +116,9 @@ export function content_of({ time_s, runs }: AlignedRuns, shown: Shown): PlotCon
   };
 }
 
-export function values_range({ traces }: PlotContent): [number, number] | null {
-  let [low, high] = [Infinity, -Infinity];
-  for (const { values } of traces) {
+function extent_of(columns: readonly Values[]): Extent | null {
+  let [low, high] = kNoExtent;
+  for (const values of columns) {
     for (const value of values) {
       if (value === null) continue;
       low = Math.min(low, value);
@@ -125,6 +126,17 @@ export function values_range({ traces }: PlotContent): [number, number] | null {
     }
   }
   return low <= high ? [low, high] : null;
+}
+
+export const extents_of = ({ traces, bands }: PlotContent) => ({
+  traces: extent_of(traces.map(({ values }) => values)),
+  bands: extent_of(bands.flatMap(({ low, high }) => [low, high])),
+});
+
+// The farthest that a band reaches from its trace.
+export function largest_spread_m({ bands }: PlotContent): number {
+  const spreads = bands.flatMap(({ low, high }) => high.map((value, row) => ((value ?? 0) - (low[row] ?? 0)) / 2));
+  return spreads.reduce((largest, spread) => Math.max(largest, spread), 0);
 }
 
 export function cursor_text({ time_s, runs, grid_s }: AlignedRuns, shown: Shown, at_s: number | null): string {
@@ -146,6 +158,7 @@ export function ComparePlots({ aligned, comparison, is_loading }: Props) {
   const hosts = useRef<(HTMLDivElement | null)[]>([]);
   const plots = useRef<RunPlot[]>([]);
   const cursors = useRef(kShown.map(() => signal(''))).current;
+  const cuts = useRef(kShown.map(() => signal(''))).current; // what is said of a band that is cut
   const cursor_time = useRef(signal('')).current;
   const latest = useRef(aligned);
   latest.current = aligned;
@@ -188,7 +201,8 @@ export function ComparePlots({ aligned, comparison, is_loading }: Props) {
   useEffect(() => {
     plots.current.forEach((plot, at) => {
       const content = content_of(aligned, kShown[at] as Shown);
-      plot.show(content, view, values_range(content));
+      const is_cut = plot.show(content, view, extents_of(content));
+      (cuts[at] as Signal<string>).value = is_cut ? band_cut_text(largest_spread_m(content)) : '';
     });
   }, [aligned, view[0], view[1]]);
   const reference = aligned.runs.find((run) => run.run_id === aligned.reference_run_id);
@@ -221,6 +235,7 @@ export function ComparePlots({ aligned, comparison, is_loading }: Props) {
               {shown.is_difference && reference && <span class="quiet"> from #{reference.run_id}</span>}
               {at === 0 && <RunKey runs={aligned.runs} />}
               {at < 2 && aligned.runs.length <= kMostBands && <span class="quiet"> ± 2 sd</span>}
+              <span class="band-cut">{cuts[at]}</span>
               <output class="cursor">{cursors[at]}</output>
             </figcaption>
             <div class="plot" ref={(host) => void (hosts.current[at] = host)} />

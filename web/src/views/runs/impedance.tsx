@@ -131,7 +131,7 @@ function Map({ map }: { map: ImpedanceMap }) {
     const range: [number, number] | null = values.length > 0 ? [Math.min(...values), Math.max(...values)] : null;
     const half_m = map.bin_m / 2;
     const show = () => {
-      plot.show(content, [(position_m[0] ?? 0) - half_m, (position_m.at(-1) ?? 1) + half_m], range);
+      plot.show(content, [(position_m[0] ?? 0) - half_m, (position_m.at(-1) ?? 1) + half_m], { traces: range });
       plot.restyle();
     };
     show();

@@ -2,14 +2,14 @@
 
 import { signal, type Signal } from '@preact/signals';
 import { useEffect, useRef } from 'preact/hooks';
-import { clock_time, count } from '../../format';
+import { band_cut_text, clock_time, count } from '../../format';
 import { go_to, type Route } from '../../route';
 import type { Window } from './runs_api';
 import type { RunPage } from './run_page';
 import { RunPlot, type PlotOptions } from './run_plot';
 import { content_of, cursor_text, kStrips, lines_of } from './strips';
 import { clock_label, since_text, time_of_day_s, time_splits, time_step_s } from './time_axis';
-import { range_of } from './traces';
+import { largest_spread_m, range_of } from './traces';
 import { inside, moved, parse_window, window_query, zoomed } from './windows';
 
 const kPixelsOfALabel = 96;
@@ -19,6 +19,7 @@ export function RunPlots({ page, route }: { page: RunPage; route: Route }) {
   const plots = useRef<RunPlot[]>([]);
   const cursors = useRef(kStrips.map(() => signal(''))).current;
   const cursor_time = useRef(signal('')).current;
+  const cut = useRef(signal('')).current; // what is said of a band that is cut
   const is_clock = route.query['time'] === 'clock';
   const bounds = page.bounds;
   const window = parse_window(route.query);
@@ -87,7 +88,12 @@ export function RunPlots({ page, route }: { page: RunPage; route: Route }) {
       const strip = kStrips[at] as (typeof kStrips)[number];
       const columns = strip.traces.map((trace) => trace.column);
       const lines = lines_of(moments, page.origin_us, picked_s, at === 0);
-      plot.show(content_of(strip, traces, lines), view, range_of(traces, columns, ...view), options_of(at));
+      const extents = {
+        traces: range_of(traces, columns, ...view),
+        bands: strip.has_band ? range_of(traces, ['low_m', 'high_m'], ...view) : null,
+      };
+      const is_cut = plot.show(content_of(strip, traces, lines), view, extents, options_of(at));
+      if (strip.has_band) cut.value = is_cut ? band_cut_text(largest_spread_m(traces, ...view)) : '';
     });
     write_cursor(cursor_s.current); // of the values that are drawn now
   }, [traces, moments, picked_s, is_clock, view[0], view[1]]);
@@ -133,6 +139,7 @@ export function RunPlots({ page, route }: { page: RunPage; route: Route }) {
             <figcaption>
               <b>{title}</b> <span class="unit">{unit}</span>
               {name === 'position' && <PositionKey />}
+              {name === 'position' && <span class="band-cut">{cut}</span>}
               <output class="cursor">{cursors[at]}</output>
             </figcaption>
             <div class="plot" ref={(host) => void (hosts.current[at] = host)} />

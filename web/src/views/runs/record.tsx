@@ -1,7 +1,7 @@
 // Beside the plots of a run: how complete its record is, its digest, its conditions, what is said of it, and its files.
 
-import { useSignal } from '@preact/signals';
 import type { ComponentChildren } from 'preact';
+import { draft_of, type DraftName } from '../../drafts';
 import { count, date_and_time, duration, fluid_text } from '../../format';
 import { GuardedButton } from '../../parts/hold_button';
 import { OutcomeLine, useAsking } from '../../parts/request';
@@ -30,8 +30,8 @@ export function Record({ session, api, page }: RecordProps) {
       {may_give_up && <GiveUp api={api} page={page} run={run} />}
       {may_write ? (
         <>
-          <Said key={`said-${run.run_id}`} api={api} page={page} run={run} />
-          <NewMarker api={api} page={page} run={run} />
+          <Said key={`said-${run.run_id}`} session={session} api={api} page={page} run={run} />
+          <NewMarker session={session} api={api} page={page} run={run} />
         </>
       ) : (
         <SaidOnly run={run} />
@@ -85,7 +85,7 @@ function Completeness({ run, certificate }: { run: Run; certificate: Certificate
 
 // Of a run whose robot does not come back, for admins.
 export function GiveUp({ api, page, run }: { api: RunsApi; page: RunPage; run: Run }) {
-  const asking = useAsking();
+  const asking = useAsking('station');
   const certificate = page.certificate.value;
   const missing = certificate && !certificate.final ? certificate.samples_missing : 0;
   if (run.state === 'discarded' || (missing === 0 && asking.outcome.value.phase === 'idle')) return null;
@@ -112,11 +112,12 @@ export function GiveUp({ api, page, run }: { api: RunsApi; page: RunPage; run: R
   );
 }
 
-function Said({ api, page, run }: { api: RunsApi; page: RunPage; run: Run }) {
-  const asking = useAsking();
-  const name = useSignal<string | null>(null); // null: as it is
-  const notes = useSignal<string | null>(null);
-  const verdict = useSignal<string | null>(null);
+type OfRunProps = RecordProps & { run: Run };
+
+export function Said({ session, api, page, run }: OfRunProps) {
+  const asking = useAsking('station');
+  const draft = (of: DraftName) => draft_of(session, `${run.run_id}`, of); // null: as it is
+  const [name, notes, verdict] = [draft('run_name'), draft('run_notes'), draft('run_verdict')];
   const change: Annotation = {};
   if (name.value !== null && name.value.trim() !== run.name) change.name = name.value.trim();
   if (notes.value !== null && notes.value !== run.notes) change.notes = notes.value;
@@ -124,12 +125,14 @@ function Said({ api, page, run }: { api: RunsApi; page: RunPage; run: Run }) {
   const is_changed = Object.keys(change).length > 0;
   const save = async () => {
     if (change.name === '') return asking.fail('A run has a name: write one of at least one letter.');
+    const sent = [name, notes, verdict].map((each) => ({ each, text: each.peek() }));
     const saved = await asking.ask(
       'Change',
       async () => (page.run.value = await api.annotate(run.run_id, change)),
       kStation,
     );
-    if (saved) name.value = notes.value = verdict.value = null;
+    if (!saved) return;
+    for (const { each, text } of sent) if (each.peek() === text) each.value = null; // else it was typed meanwhile
   };
   return (
     <form
@@ -174,24 +177,25 @@ function Said({ api, page, run }: { api: RunsApi; page: RunPage; run: Run }) {
   );
 }
 
-function NewMarker({ api, page, run }: { api: RunsApi; page: RunPage; run: Run }) {
-  const asking = useAsking();
-  const text = useSignal('');
+export function NewMarker({ session, api, page, run }: OfRunProps) {
+  const asking = useAsking('station');
+  const draft = draft_of(session, `${run.run_id}`, 'marker');
+  const text = draft.value ?? '';
   const at_s = page.picked_s.value;
   if (at_s === null) return <p class="quiet">Click on a plot to put a marker there.</p>;
   const add = async () => {
-    if (text.value.trim() === '') return asking.fail('Write what happened there.');
+    if (text.trim() === '') return asking.fail('Write what happened there.');
     const at_us = page.origin_us + at_s * 1e6;
     const added = await asking.ask(
       'Marker',
       async () => {
-        await api.add_marker(run.robot_id, text.value.trim(), at_us);
+        await api.add_marker(run.robot_id, text.trim(), at_us);
         page.markers.value = await api.markers(run.run_id);
       },
       kStation,
     );
     if (!added) return;
-    text.value = '';
+    draft.value = null;
     page.picked_s.value = null;
   };
   return (
@@ -209,8 +213,8 @@ function NewMarker({ api, page, run }: { api: RunsApi; page: RunPage; run: Run }
         autoComplete="off"
         maxLength={4000}
         placeholder="What happened"
-        value={text.value}
-        onInput={(event) => (text.value = event.currentTarget.value)}
+        value={text}
+        onInput={(event) => (draft.value = event.currentTarget.value)}
       />
       <span class="pair-of-buttons">
         <button type="submit" id="add-marker" disabled={asking.pending}>

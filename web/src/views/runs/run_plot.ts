@@ -3,7 +3,7 @@
 // Plots of one group share cursor and window. A row's gap is a null. Lines across the plot are moments, drawn below traces.
 
 import uPlot from 'uplot';
-import { next_range, range_splits } from '../../range';
+import { is_cut, kNoExtent, next_range, range_splits, with_band, type Extent } from '../../range';
 import type { Values } from './traces';
 
 export interface PlotTrace {
@@ -64,18 +64,19 @@ export class RunPlot {
     this.observer.observe(host);
   }
 
-  // `values_range`: least and largest value in the view; null: nothing is there.
+  // Least and largest value in the view, of the traces and of the bands; null: nothing is there. Whether a band is cut.
   show(
     content: PlotContent,
-    view: [number, number],
-    values_range: [number, number] | null,
+    view: Extent,
+    { traces, bands = null }: { traces: Extent | null; bands?: Extent | null },
     options = this.options,
-  ): void {
+  ): boolean {
     this.content = content;
     this.view = view;
     this.options = options;
-    if (!options.fixed_range && values_range) {
-      this.range = next_range([0, 0], values_range[0], values_range[1], options.least_span);
+    if (!options.fixed_range && traces) {
+      const shown = with_band(traces, bands ?? kNoExtent, options.least_span);
+      this.range = next_range([0, 0], ...shown, options.least_span);
     }
     const shape = JSON.stringify([
       content.bands.length,
@@ -87,6 +88,7 @@ export class RunPlot {
       this.plot = this.build();
     }
     this.fill();
+    return bands !== null && is_cut(this.range, bands);
   }
 
   // Colours live in the style sheet; a change of theme builds the plot anew.

@@ -149,3 +149,14 @@ export function range_of(
   }
   return low <= high ? [low, high] : null;
 }
+
+// The farthest that the band reaches from the estimate between two times.
+export function largest_spread_m({ time_s, columns }: Traces, from_s: number, to_s: number): number {
+  const { estimate_m, low_m, high_m } = columns;
+  return time_s.reduce((largest, at_s, row) => {
+    const [middle, low, high] = [estimate_m[row] ?? null, low_m[row] ?? null, high_m[row] ?? null];
+    if (at_s < from_s || at_s > to_s || middle === null || low === null || high === null) return largest;
+    // A row has one extreme of its point, and lies nearer to that edge of the band.
+    return Math.max(largest, Math.min(high - middle, middle - low));
+  }, 0);
+}
