@@ -43,6 +43,7 @@ async function nothing_moves(what) {
 }
 
 async function engage_auto(setpoint_mm) {
+  await page.locator('#send-setpoint:enabled').waitFor();
   await page.fill('#setpoint-entry', String(setpoint_mm));
   await page.press('#setpoint-entry', 'Enter');
   await seen_mode('auto');
@@ -87,6 +88,7 @@ const steps = {
   },
 
   async 'a setpoint out of range is refused in words'() {
+    await page.locator('#send-setpoint:enabled').waitFor();
     await page.fill('#setpoint-entry', '99999');
     await page.press('#setpoint-entry', 'Enter');
     await page.locator('#setpoint-outcome.failed').waitFor();
@@ -107,6 +109,7 @@ const steps = {
   },
 
   async 'Escape stops, also from inside a field; the time is shown'() {
+    await page.locator('#send-setpoint:enabled').waitFor();
     await page.fill('#setpoint-entry', '30');
     await page.press('#setpoint-entry', 'Enter');
     await until('the motor runs', async () => Math.abs((await robot()).sample.duty) > 0.05);

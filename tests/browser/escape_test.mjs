@@ -24,6 +24,7 @@ async function escape_stops(what, press = () => page.keyboard.press('Escape')) {
 }
 
 async function engage_auto() {
+  await page.locator('#send-setpoint:enabled').waitFor();
   await page.fill('#setpoint-entry', '40');
   await page.press('#setpoint-entry', 'Enter');
   await seen_mode('auto');

@@ -28,8 +28,8 @@ TEST_F(ExperimentFaultsTest, ARobotThatStopsByItselfIsNotMovedByTheNextStep) {
   come("anna");
   ASSERT_TRUE(command_by("anna", sim_robot::set_parameter("position_limit_max_m", 0.08F)));
   clock.run_for(1s);
-  const auto id = start(profile(
-      {"kind = \"duty\"\nduty = 0.3\nfor_s = 20", "kind = \"setpoint\"\nsetpoint_m = -0.05\nfor_s = 6"}));
+  const auto id =
+      start(profile({"kind = \"duty\"\nduty = 0.3\nfor_s = 20", "kind = \"setpoint\"\nsetpoint_m = -0.05\nfor_s = 6"}));
   expect_aborted(id, "position_uncertain");
   clock.run_for(20s);
   EXPECT_EQ(state().context.mode, rheonaut_MODE_MANUAL);

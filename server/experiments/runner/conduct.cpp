@@ -265,8 +265,8 @@ void Conduct::on_samples(const station::SampleBatch& batch) {
 // Somebody puts the robot into another fluid, and resumes when that is done.
 bool Conduct::is_in_hands() const { return waiting_for_ && waiting_for_->reason == "fluid"; }
 
-// SAFETY: also between two runs, and also of a latch that is reset before the next: who stops the robot at the tube ends
-// the experiment.
+// SAFETY: also between two runs, and also of a latch that is reset before the next: who stops the robot at the tube
+// ends the experiment.
 void Conduct::watch_latch(const station::RobotState& robot) {
   if (!robot.latched() || is_in_hands()) return;
   abort({"emergency", fmt::format("the robot is in emergency ({})", protocol::text(robot.context.emergency_cause))});

@@ -118,7 +118,8 @@ asio::awaitable<Result<ExperimentView>> Experiments::begin(storage::ExperimentRe
   const ExperimentId id = experiment.id;
   Entry& kept = entries_[id];
   kept = std::move(entry);
-  if (holds_[robot_id].count != holds_before) {  // SAFETY: a stop, or an abort, while it was being stored holds it as well
+  if (holds_[robot_id].count !=
+      holds_before) {  // SAFETY: a stop, or an abort, while it was being stored holds it as well
     kept.experiment.is_held = kept.is_changed = true;
     kept.experiment.reason = holds_[robot_id].reason;
   }

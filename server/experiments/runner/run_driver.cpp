@@ -22,7 +22,7 @@ constexpr microseconds kTurn = 20ms;           // between two looks, if no sampl
 constexpr microseconds kBeginsAfter = 500ms;   // more than kLookAhead
 constexpr microseconds kWrongModeFor = 400ms;  // telemetry comes later than the time of a command
 constexpr double kMmOfOneM = 1e3;
-constexpr microseconds kRenewsEvery = 120ms;   // a lease lasts 500 ms
+constexpr microseconds kRenewsEvery = 120ms;  // a lease lasts 500 ms
 
 // Commands of which a run knows nothing, and that change what it measures.
 constexpr std::array<std::string_view, 8> kDisturbing{"set_mode",          "set_setpoint",       "set_duty",
@@ -172,8 +172,8 @@ void RunDriver::on_own_command(const station::CommandRecord& record) {
   if (auto fault = fault_of(record)) abort(std::move(*fault));
 }
 
-// SAFETY: the robot has ended its motion by itself and is in manual, as it was, so that somebody looks; the next step of
-// the line would move it again.
+// SAFETY: the robot has ended its motion by itself and is in manual, as it was, so that somebody looks; the next step
+// of the line would move it again.
 void RunDriver::on_event(const station::RobotEvent& event) {
   const bool is_of_now = event.boot_id == boot_id_ && event.robot_time_us >= began_robot_us_;
   if (!is_of_now || event.kind != "position_uncertain") return;

@@ -95,10 +95,11 @@ std::optional<std::uint64_t> BootStore::last_emergency(std::int64_t boot_key) {
                           "SELECT robot_time_us, iif(kind = 'emergency', emergency_id, 0) FROM event"
                           " WHERE boot_key = ? AND event_seq IS NOT NULL AND kind IN ('emergency', 'emergency_cleared')"
                           " ORDER BY event_seq DESC LIMIT 1"};
-  SQLite::Statement stop{database_.handle(),
-                         "SELECT effect_at_robot_us, command.emergency_id FROM boot JOIN command USING (robot_id, boot_id)"
-                         " WHERE boot_key = ? AND kind = 'emergency_stop' AND effect_at_robot_us > 0"
-                         " ORDER BY effect_at_robot_us DESC LIMIT 1"};
+  SQLite::Statement stop{
+      database_.handle(),
+      "SELECT effect_at_robot_us, command.emergency_id FROM boot JOIN command USING (robot_id, boot_id)"
+      " WHERE boot_key = ? AND kind = 'emergency_stop' AND effect_at_robot_us > 0"
+      " ORDER BY effect_at_robot_us DESC LIMIT 1"};
   std::optional<std::uint64_t> latch;
   std::int64_t known_at_robot_us = 0;
   for (SQLite::Statement* query : {&segment, &event, &stop}) {

@@ -1188,4 +1188,5 @@ SELECT printf('%llu', command_id) AS command_id, robot_id, printf('%llu', boot_i
 FROM command;
 CREATE INDEX run_span_by_boot ON run_span(boot_key);
 CREATE INDEX run_by_robot ON run(robot_id, started_at_us);
+CREATE INDEX command_stop ON command(boot_id, effect_at_robot_us) WHERE kind = 'emergency_stop';
 COMMIT;

@@ -176,6 +176,11 @@ TEST_F(MigrationTest, WhatIsAskedOftenIsAnsweredByIndex) {
   EXPECT_EQ(plan("SELECT 1 FROM run WHERE robot_id = 'nemo' AND state <> 'discarded' AND started_at_us <= 5"
                  " AND coalesce(ended_at_us, 9) >= 5"),
             std::vector<std::string>{"SEARCH run USING INDEX run_by_robot (robot_id=? AND started_at_us<?)"});
+  EXPECT_EQ(plan("SELECT effect_at_robot_us, command.emergency_id FROM boot JOIN command USING (robot_id, boot_id)"
+                 " WHERE boot_key = 1 AND kind = 'emergency_stop' AND effect_at_robot_us > 0"
+                 " ORDER BY effect_at_robot_us DESC LIMIT 1"),
+            (std::vector<std::string>{"SEARCH boot USING INTEGER PRIMARY KEY (rowid=?)",
+                                      "SEARCH command USING INDEX command_stop (boot_id=? AND effect_at_robot_us>?)"}));
 }
 
 // What was in force at a span's first sample counts, and what came into force within it; nothing before or after.
