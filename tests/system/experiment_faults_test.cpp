@@ -1,5 +1,4 @@
 // SAFETY: an experiment whose robot stops by itself, and one that the disk does not take as it is to be.
-#include <future>
 #include <thread>
 
 #include "server/experiments/runner/stubborn_writer.hpp"
@@ -102,38 +101,17 @@ TEST_F(ExperimentFaultsTest, AnAbortBetweenARequestAndItsPlaceInTheQueueHoldsIt)
   come("anna");
   const auto id = enqueue(profile({kTenSeconds}, "[conditions]\npump = \"constant\"\nmean_flow_m_s = 0.04\n"));
   until(id, ExperimentState::paused);
-  std::promise<void> gate;
-  std::optional<Result<ExperimentView>> begun;
-  const auto wait_at_gate = [&]() -> boost::asio::awaitable<void> {
-    auto job = [opened = gate.get_future().share()] { opened.wait(); };
-    co_await maths.run(std::move(job));
-  };
-  const auto ask = [&]() -> boost::asio::awaitable<void> {
-    storage::ExperimentRequest request;
-    request.robot_id = "sim-1";
-    request.profile = profile({kTenSeconds});
-    const station::Author by{"anna", "127.0.0.1", 0};
-    begun = co_await experiments->begin(std::move(request), by);
-  };
-  const auto abort = [&]() -> boost::asio::awaitable<void> {
-    const station::Author by{"anna", "127.0.0.1", 0};
-    co_await experiments->abort(id, "", by);
-  };
-  tasks.spawn("work before it", wait_at_gate());
-  tasks.spawn("a request", ask());
-  tasks.spawn("an abort", abort());
-  while (experiments->summary(id)) {  // no virtual time passes: the worker is kept
+  request_behind_work(profile({kTenSeconds}));
+  abort_aside(id);
+  while (experiments->summary(id)) {
     loop.restart();
     loop.poll();
     std::this_thread::yield();
   }
-  EXPECT_FALSE(begun) << "its profile waits to be read";
-  gate.set_value();
-  ASSERT_TRUE(clock.run_until([&] { return begun.has_value(); }, 5s));
-  ASSERT_TRUE(*begun);
+  let_worker_go();
   clock.run_for(8s);
-  EXPECT_EQ(view((*begun)->experiment.id).waits_for, "held");
-  EXPECT_EQ(view((*begun)->experiment.id).experiment.reason, "previous_aborted");
+  EXPECT_EQ(view((*answered)->experiment.id).waits_for, "held");
+  EXPECT_EQ(view((*answered)->experiment.id).experiment.reason, "previous_aborted");
   EXPECT_EQ(robot->simulated().motor_duty(), 0);
 }
 
@@ -142,15 +120,7 @@ TEST_F(ExperimentFaultsTest, ARobotThatWasSwitchedOffForItsFluidGoesOnWhenItsAct
   begin();
   const auto id = start(profile({kRest}, "[sweep]\nfluids = [\"non_newtonian\", \"water\"]\n"));
   until(id, ExperimentState::paused);
-  robot->redial = false;
-  robot->cut();
-  clock.run_for(1s);
-  const auto before = std::move(robot);
-  sim_robot::SimulatedRobotConfig rebooted;
-  rebooted.boot_id = 2;
-  robot = std::make_unique<VirtualRobot>(loop, clock, tasks, rebooted);
-  robot->dial(*listener);
-  ASSERT_TRUE(clock.run_until([&] { return state().boot_id == 2 && state().sample; }, 5s));
+  switch_off_and_on();
   ASSERT_TRUE(station.set_fluid("sim-1", "water", {"anna", "", clock.utc_us()}));
   leave("anna");
   clock.run_for(1s);

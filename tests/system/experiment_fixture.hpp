@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <future>
 #include <map>
 
 #include "server/experiments/runner/experiments.hpp"
@@ -111,6 +112,34 @@ class ExperimentTest : public SystemTest {
     return station.control(request);
   }
 
+  // The robot is off for a second, and has booted again.
+  void switch_off_and_on() {
+    robot->redial = false;
+    robot->cut();
+    clock.run_for(1s);
+    switched_off_.push_back(std::move(robot));
+    sim_robot::SimulatedRobotConfig rebooted;
+    rebooted.boot_id = 2;
+    robot = std::make_unique<VirtualRobot>(loop, clock, tasks, rebooted);
+    robot->dial(*listener);
+    EXPECT_TRUE(clock.run_until([&] { return state().boot_id == 2 && state().sample; }, 5s));
+  }
+
+  // Anna asks for an experiment; its profile is read when let_worker_go() lets the worker go on. No time may pass
+  // before.
+  void request_behind_work(std::string document) {
+    tasks.spawn("work before it", wait_at_gate());
+    tasks.spawn("a request", request(std::move(document)));
+  }
+  void let_worker_go() {
+    EXPECT_FALSE(answered) << "its profile waits to be read";
+    gate_.set_value();
+    EXPECT_TRUE(clock.run_until([&] { return answered && *answered; }, 5s));
+  }
+  std::optional<Result<server::experiments::ExperimentView>> answered;  // that request
+
+  void abort_aside(storage::ExperimentId id) { tasks.spawn("an abort", abort(id)); }
+
   runtime::WorkerThread maths{"maths"};
   std::unique_ptr<server::experiments::Experiments> experiments;
 
@@ -122,6 +151,23 @@ class ExperimentTest : public SystemTest {
     clock.run_for(50ms);
   }
 
+  boost::asio::awaitable<void> wait_at_gate() {
+    auto job = [opened = gate_.get_future().share()] { opened.wait(); };
+    co_await maths.run(std::move(job));
+  }
+  boost::asio::awaitable<void> request(std::string document) {
+    storage::ExperimentRequest request;
+    request.robot_id = "sim-1";
+    request.profile = std::move(document);
+    const station::Author by{"anna", "127.0.0.1", 0};
+    answered = co_await experiments->begin(std::move(request), by);
+  }
+
+  boost::asio::awaitable<void> abort(storage::ExperimentId id) {
+    const station::Author by{"anna", "127.0.0.1", 0};
+    co_await experiments->abort(id, "", by);
+  }
+
   boost::asio::awaitable<void> stay(std::string actor) {
     for (;;) {
       if (is_there_[actor]) station.keep_control(actor, 20ms);
@@ -129,6 +175,8 @@ class ExperimentTest : public SystemTest {
     }
   }
 
+  std::promise<void> gate_;
+  std::vector<std::unique_ptr<VirtualRobot>> switched_off_;
   std::vector<std::unique_ptr<server::experiments::Experiments>> before_;
   std::map<std::string, bool> is_there_;
 };

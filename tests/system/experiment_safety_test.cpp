@@ -1,7 +1,5 @@
 // SAFETY: an experiment moves a robot only for somebody who is there and in control, and leaves it at rest. Each test
 // breaks one of the things that this rests on.
-#include <future>
-
 #include "server/storage/experiments/experiment_store.hpp"
 #include "tests/system/experiment_fixture.hpp"
 
@@ -76,32 +74,15 @@ TEST_F(ExperimentSafetyTest, ADutyDoesNotBeginWhileNobodyIsThere) {
 
 TEST_F(ExperimentSafetyTest, AStopBetweenItsRequestAndItsPlaceInTheQueueHoldsIt) {
   come("anna");
-  std::promise<void> gate;
-  std::optional<Result<ExperimentView>> begun;
-  const auto wait_at_gate = [&]() -> boost::asio::awaitable<void> {
-    auto job = [opened = gate.get_future().share()] { opened.wait(); };
-    co_await maths.run(std::move(job));
-  };
-  const auto ask = [&]() -> boost::asio::awaitable<void> {
-    storage::ExperimentRequest request;
-    request.robot_id = "sim-1";
-    request.profile = profile({kLongDuty});
-    const station::Author by{"anna", "127.0.0.1", 0};
-    begun = co_await experiments->begin(std::move(request), by);
-  };
-  tasks.spawn("work before it", wait_at_gate());
-  tasks.spawn("a request", ask());
+  request_behind_work(profile({kLongDuty}));
   send(sim_robot::emergency_stop());
   loop.restart();
   loop.poll();
-  EXPECT_FALSE(begun) << "its profile waits to be read";
-  gate.set_value();
-  ASSERT_TRUE(clock.run_until([&] { return begun.has_value(); }, 5s));
-  ASSERT_TRUE(*begun);
+  let_worker_go();
   clock.run_for(1s);
   ASSERT_TRUE(command_by("anna", sim_robot::clear_emergency(state().context.emergency_id)));
   clock.run_for(8s);
-  EXPECT_EQ(view((*begun)->experiment.id).waits_for, "held");
+  EXPECT_EQ(view((*answered)->experiment.id).waits_for, "held");
   EXPECT_EQ(duty(), 0);
 }
 

@@ -204,15 +204,7 @@ TEST_F(ExperimentsTest, AllRunsHaveTheControllerOfTheFirst) {
   ASSERT_TRUE(sent) << sent.error().detail;
   const auto id = start(profile({kSetpoint}, "[sweep]\nfluids = [\"non_newtonian\", \"water\"]\n"));
   until(id, ExperimentState::paused);
-  robot->redial = false;
-  robot->cut();
-  clock.run_for(1s);
-  const auto before = std::move(robot);
-  sim_robot::SimulatedRobotConfig rebooted;
-  rebooted.boot_id = 2;
-  robot = std::make_unique<VirtualRobot>(loop, clock, tasks, rebooted);
-  robot->dial(*listener);
-  ASSERT_TRUE(clock.run_until([&] { return state().boot_id == 2 && state().sample; }, 5s));
+  switch_off_and_on();
   ASSERT_TRUE(station.set_fluid("sim-1", "water", {"anna", "", clock.utc_us()}));
   ASSERT_TRUE(wait_for(experiments->resume(id, {"anna", "", 0})));
   ASSERT_TRUE(clock.run_until([&] { return view(id).experiment.reason == "other_controller"; }, 10s));
