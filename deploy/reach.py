@@ -9,7 +9,9 @@
 Usage: deploy/reach.py FILE... (paths from the top of the tree; a deleted file is named as well)
 
 A room is reached with all of its files, since a header may be carried out by any source of its room. A file that is no
-source (a document, a table of numbers) reaches the tests whose sources name it.
+source (a document, a table of numbers) reaches the tests whose sources name it. A test with processes is reached by its
+own scripts, and by the files that they name. A change of the programs or of the page would reach all of them, half an
+hour: it has TOGETHER instead, and CI runs the others.
 """
 import pathlib
 import re
@@ -21,8 +23,16 @@ CPP = (".cpp", ".hpp", ".h", ".ino")
 # What decides how everything is built or tested.
 EVERYTHING = re.compile(r"(CMakeLists\.txt|CMakePresets\.json|cmake/.*|tests/CMakeLists\.txt|deploy/(build|packages|test|"
                         r"reach\.py)|\.ci/.*)$")
-CHECKS = ("rules", "rules_test", "rooms", "docs", "docs_test", "docs_messages", "format", "reach_test",
-          "tidy_test", "arm64_test", "esp8266_check_test")  # seconds; after every change
+CHECKS = ("rules", "rooms", "docs", "docs_messages", "docs_reasons", "docs_safety")  # seconds; after every change
+# Tests of the project's own scripts: what each of them tests.
+SCRIPTS = {"rules_test": "tests/check_rules", "docs_test": "tests/check_docs", "docs_messages_test": "tests/check_messages",
+           "docs_commands_test": "tests/check_commands", "docs_not_yet_test": "tests/check_not_yet",
+           "docs_reasons_test": "tests/check_reasons", "docs_safety_test": "tests/check_safety",
+           "second_try_test": "tests/second_try", "chip_judge_test": "tests/lx106/judge", "reach_test": "deploy/reach",
+           "tidy_test": "deploy/tidy", "arm64_test": "deploy/arm64", "esp8266_check_test": "deploy/esp8266-check",
+           "backup_daily_test": "deploy/debian/backup-daily"}
+# The programs together, in half a minute: a stop by every way, a station that is killed.
+TOGETHER = ("system_stop", "system_kill")
 LX106 = re.compile(r"(robot_fw|protocol|sim_robot/(world|robot|network|faults|scenario|lab)|control/models|tests/lx106)/|"
                    r"deploy/(lx106|esp8266)")
 DOCUMENT = re.compile(r"[^/]*\.md$|docs/|site/|tests/site/|deploy/(site|npm-packages)$")
@@ -151,6 +161,9 @@ def reached(root, changed):
     nodes = set().union(*(changed_nodes(path) for path in changed))
     others = [path for path in changed if not path.endswith(CPP)]
     lines = {f"test {name}" for name in CHECKS}
+    lines |= {f"test {name}" for name, script in SCRIPTS.items() if any(is_part(path, name, script) for path in changed)}
+    if any(path.endswith(CPP) for path in changed):
+        lines.add("test format")
     for program, units in tree.programs.items():
         text = tree.named_by(program)
         if nodes & tree.closure(units) or any(name in text for path in others for name in names_of(path)):
@@ -166,7 +179,7 @@ def reached(root, changed):
     if any(LX106.match(path) for path in changed):
         lines |= {"lx106", "test esp8266_check"}
     if any(DOCUMENT.match(path) for path in changed):
-        lines |= {"test site", "test docs_commands", "test docs_not_yet"}
+        lines |= {"test docs_commands", "test docs_not_yet"}
     if any(COMMANDS.match(path) for path in changed):
         lines.add("test docs_commands")
     if any(INTERFACE.match(path) for path in changed):
@@ -176,18 +189,23 @@ def reached(root, changed):
     return sorted(lines)
 
 
+def is_part(path, test, script):
+    """Whether the file is the script, or the test of it."""
+    return path.split(".")[0] == script or path.rpartition("/")[2] in (test + ".py", script.rpartition("/")[2] + "_test.py")
+
+
 def is_named(tree, path):
     return path.startswith("tests/data/fuzz/") or any(name in tree.named_by(program) for program in tree.programs
                                                       for name in names_of(path))
 
 
 def process_tests(tree, changed, nodes, others):
-    """Tests that run the programs: all of them when a program is reached, else those whose scripts are."""
-    is_station_reached = bool(nodes & tree.closure({"server/main"}))
+    """Tests that run the programs."""
     is_robot_reached = bool(nodes & tree.closure({"sim_robot/main"}))
+    if is_robot_reached or nodes & tree.closure({"server/main"}):
+        yield from TOGETHER
     for name, text, paths in tree.scripts():
-        named = any(name in text for path in others for name in names_of(path))
-        if is_station_reached or is_robot_reached or named or paths & set(changed):
+        if paths & set(changed) or any(name in text for path in others for name in names_of(path)):
             yield name
     if is_robot_reached or "tests/sim_robot/CMakeLists.txt" in changed:
         yield "rheonaut_sim_.*"
@@ -198,7 +216,7 @@ def process_tests(tree, changed, nodes, others):
 
 def web_tests(tree, changed):
     if any(path.startswith("web/") or path == "server/api/openapi.yaml" for path in changed):
-        yield "web"
+        yield "web_.*"
     if any(re.match(r"web/(?!tests/)", path) or path == "tests/browser/CMakeLists.txt" for path in changed):
         yield from (name for name, _, _ in tree.scripts() if name.startswith("browser_"))
 
