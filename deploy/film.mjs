@@ -8,7 +8,8 @@ import { execFileSync } from 'node:child_process';
 import { mkdtempSync, rmSync, statSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
-import { Bench, clear_latch, until } from '../tests/browser/programs.mjs';
+import { clear_latch } from '../tests/browser/hands.mjs';
+import { Bench, until } from '../tests/browser/programs.mjs';
 import { confirm_model } from './page_scenes.mjs';
 
 const kRobot = 'rheo-1';

@@ -115,10 +115,23 @@ class Tree:
         """(CTest's name, its text with that of the modules that it imports, their paths) of each test with processes."""
         for path in sorted((self.root / "tests/system").glob("*_test.py")):
             yield ("system_" + path.name[:-len("_test.py")], *self._script(path))
-        for path in sorted((self.root / "tests/browser").glob("*_test.mjs")):
-            yield ("browser_" + path.name[:-len("_test.mjs")], *self._script(path))
+        yield from self._browser_scripts()
         for path in (self.root / "tests/server/cli").glob("documented_commands_test.py"):
             yield ("documented_commands", *self._script(path))
+
+    def _browser_scripts(self):
+        """The stories of a group are one test; a *_test.mjs in no group is one by itself."""
+        folder = self.root / "tests/browser"
+        listing = folder / "CMakeLists.txt"
+        text = re.sub(r"#[^\n]*", "", listing.read_text(encoding="utf-8")) if listing.exists() else ""
+        alone = {path.name for path in folder.glob("*_test.mjs")}
+        for name, stories in re.findall(r"^browser_stories\((\w+)([^)]*)\)", text, re.M):
+            files = [f"{story}_test.mjs" for story in stories.split()]
+            alone -= set(files)
+            scripts = [self._script(folder / file) for file in ("stories.mjs", *files)]
+            yield (name, "".join(text for text, _ in scripts), set().union(*(paths for _, paths in scripts)))
+        for file in sorted(alone):
+            yield ("browser_" + file[:-len("_test.mjs")], *self._script(folder / file))
 
     def _script(self, path):
         seen, waiting, text = set(), [path], ""

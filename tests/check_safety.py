@@ -4,7 +4,9 @@
 A guard is a mark `SAFETY:` in robot_fw/, server/, protocol/ or web/src/. The document quotes it as `path`: "the words that
 follow the mark in its line", and lists each mark once: in a table of failures, in the table of the other guards, or, one of
 the cockpit, with its test in the table of the page's guards. A test is `Suite.Name` (GoogleTest), `tests/system/x_test.py
-test_y`, `web/tests/x.ts` "title" or `tests/browser/x_test.mjs` "title"; its file must be one that is built and run. Prints `docs/safety.md: what is wrong` and fails if anything is.
+test_y`, `web/tests/x.ts` "title" or `tests/browser/x_test.mjs` "title"; its file must be one that is built and run. A story
+of the browser that is named stands in a group of CTest with such stories alone: a second try of a group that failed must
+not hide a failure of one of these. Prints `docs/safety.md: what is wrong` and fails if anything is.
 """
 import collections
 import pathlib
@@ -12,6 +14,7 @@ import re
 import sys
 
 PAGE = "docs/safety.md"
+BROWSER = "tests/browser"
 GUARDED = ("robot_fw", "server", "protocol", "web/src")
 SOURCES = (".cpp", ".hpp", ".h", ".ino", ".proto", ".ts", ".tsx", ".css")
 GUARD = re.compile(r'`([\w./]+)`: "([^"]+)"')
@@ -51,6 +54,16 @@ def googletests(root):
             text = path.read_text(encoding="utf-8")
             names |= {f"{suite}.{name}" for suite, name in re.findall(r"^TEST(?:_F|_P)?\((\w+),\s*(\w+)\)", text, re.M)}
     return names
+
+
+def mixed_groups(root, text):
+    """A story of the browser that the page names, in one test of CTest with one that it does not name."""
+    listing = root / BROWSER / "CMakeLists.txt"
+    code = re.sub(r"#.*", "", listing.read_text(encoding="utf-8")) if listing.is_file() else ""
+    for group, words in re.findall(r"^browser_stories\((\w+)([^)]*)\)", code, re.M):
+        named = [f"`{BROWSER}/{story}_test.mjs`" in text for story in words.split()]
+        if any(named) and not all(named):
+            yield f"{group} has a story that is named here beside {words.split()[named.index(False)]}, which is not"
 
 
 def missing_test(root, known, cell):
@@ -103,6 +116,7 @@ def faults(root):
             wrong = missing_test(root, known, cell)
             if wrong:
                 yield f"row {number}, {guard}: {wrong}"
+    yield from mixed_groups(root, text)
     for number, guard in re.findall(r"^\| (\d+\.\d+) \| (`web/src/[^|]*) \|$", text, re.M):
         yield f"row {number} names no test of {guard}"
     # The tables of what was measured and of the other guards name a row of these.

@@ -17,7 +17,7 @@ FILES = {
     "tests/a_test.cpp": "TEST(Stop, Acts) {}\nTEST_F(Stop, Waits) {}\n",
     "tests/system/CMakeLists.txt": "foreach(name stop)\n",
     "tests/system/stop_test.py": "class A:\n    def test_all(self):\n",
-    "tests/browser/CMakeLists.txt": "foreach(name keys)\n",
+    "tests/browser/CMakeLists.txt": "browser_stories(browser_stops keys)\n",
     "tests/browser/keys_test.mjs": "  async 'a press stops'() {\n",
     "web/src/c.tsx": "{/* SAFETY: one press */}\n",
     "web/tests/a.ts": "test('it stops', () => {});\n",
@@ -61,10 +61,15 @@ class CheckSafety(unittest.TestCase):
         self.assertEqual(found(web__src__d_dot_css="/* SAFETY: grey */\n"), ['web/src/d.css has a guard without a row: "grey"'])
         self.assertEqual(found(tests__browser__keys_test_dot_mjs="async 'a key stops'() {"),
                          ['row 1.1, `web/src/c.tsx`: "one press": no test tests/browser/keys_test.mjs "a press stops"'])
-        self.assertEqual(found(tests__browser__CMakeLists_dot_txt="foreach(name runs)"),
+        self.assertEqual(found(tests__browser__CMakeLists_dot_txt="browser_stories(browser_stops runs)"),
                          ['row 1.1, `web/src/c.tsx`: "one press": no test tests/browser/keys_test.mjs "a press stops"'])
         page = FILES["docs/safety.md"].replace(' | `tests/browser/keys_test.mjs` "a press stops" |', " |")
         self.assertEqual(found(docs__safety_dot_md=page), ['row 1.1 names no test of `web/src/c.tsx`: "one press"'])
+
+    def test_a_story_that_is_named_is_among_its_like(self):
+        mixed = "browser_stories(browser_stops keys runs)\nbrowser_stories(browser_others runs)\n"
+        self.assertEqual(found(tests__browser__CMakeLists_dot_txt=mixed),
+                         ["browser_stops has a story that is named here beside runs, which is not"])
 
     def test_rows_are_complete_and_stand_once(self):
         page = FILES["docs/safety.md"]

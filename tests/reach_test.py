@@ -35,9 +35,17 @@ SMALL_TREE = {
     "tests/system/proxy_test.py": "import os\nfrom cart import Cart\n",
     "examples/cart.py": "",
     "tests/browser/programs.mjs": "",
-    "tests/browser/escape_test.mjs": "import { run } from './programs.mjs';\n",
+    "tests/browser/hands.mjs": "",
+    "tests/browser/stories.mjs": "",
+    "tests/browser/escape_test.mjs": "import { Bench } from './programs.mjs';\n",
+    "tests/browser/fleet_test.mjs": "import { hold } from './hands.mjs';\n",
+    "tests/browser/runs_test.mjs": "import { Bench } from './programs.mjs';\n",
+    "tests/browser/programs_test.mjs": "import { until } from './programs.mjs';\n",
+    "tests/browser/CMakeLists.txt": "function(browser_stories name)\nendfunction()\n# browser_stories(browser_no_more fleet)\n"
+                                    "browser_stories(browser_stops escape fleet)\nbrowser_stories(browser_runs runs)\n",
 }
-PROCESSES = {"test system_kill", "test system_proxy", "test browser_escape", "program goldens_test"}
+BROWSER = {"test browser_stops", "test browser_runs", "test browser_programs"}
+PROCESSES = {"test system_kill", "test system_proxy", "program goldens_test"} | BROWSER
 
 
 class ReachTest(unittest.TestCase):
@@ -92,11 +100,16 @@ class ReachTest(unittest.TestCase):
     def test_a_script_reaches_itself_and_those_that_import_it(self):
         self.expect("tests/system/kill_test.py", {"test system_kill"})
         self.expect("tests/system/processes.py", {"test system_kill"})
-        self.expect("tests/browser/programs.mjs", {"test browser_escape"})
+        self.expect("tests/browser/programs.mjs", BROWSER)
+        self.expect("tests/browser/escape_test.mjs", {"test browser_stops"})
+        self.expect("tests/browser/hands.mjs", {"test browser_stops"})
+        self.expect("tests/browser/stories.mjs", {"test browser_stops", "test browser_runs"})
+        self.expect("tests/browser/programs_test.mjs", {"test browser_programs"})
+        self.expect("tests/browser/CMakeLists.txt", BROWSER)
         self.expect("examples/cart.py", {"test system_proxy"})
 
     def test_the_page_reaches_its_own_tests_and_the_browsers(self):
-        self.expect("web/src/api.ts", {"test web", "test browser_escape"})
+        self.expect("web/src/api.ts", {"test web"} | BROWSER)
         self.expect("web/tests/api_test.ts", {"test web"})
         self.expect("server/api/openapi.yaml", {"test web", "test docs_not_yet", "program page_test"} | PROCESSES)
 
@@ -120,6 +133,11 @@ class ThisTreeTest(unittest.TestCase):
         written = re.search(r"foreach\(name ([^)]*)\)", listing).group(1).split()
         known = {name for name, _, _ in reach.Tree(ROOT).scripts()}
         self.assertLessEqual({f"system_{name}" for name in written}, known)
+
+    def test_every_browser_test_is_one_of_ctest(self):
+        listing = (ROOT / "tests/browser/CMakeLists.txt").read_text(encoding="utf-8")
+        written = set(re.findall(r"^browser_stories\((\w+)", listing, re.M)) | set(re.findall(r"add_test\(NAME (browser_\w+)", listing))
+        self.assertEqual({name for name, _, _ in reach.Tree(ROOT).scripts() if name.startswith("browser_")}, written)
 
 
 if __name__ == "__main__":

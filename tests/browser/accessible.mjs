@@ -2,6 +2,8 @@
 import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
 import { createRequire } from 'node:module';
+import { drawn } from './hands.mjs';
+import { until } from './programs.mjs';
 
 const axe_path = createRequire(new URL('../../web/package.json', import.meta.url)).resolve('axe-core/axe.min.js');
 const axe_source = readFileSync(axe_path, 'utf8');
@@ -14,12 +16,12 @@ const both_at_widest = (width) => (width === 1440 ? ['light', 'dark'] : ['dark']
 export async function assert_accessible(page, what, sizes = kSizes, themes_at = both_at_widest) {
   for (const [width, height] of sizes) {
     await page.setViewportSize({ width, height });
-    await page.waitForTimeout(300); // plots follow
+    await drawn(page);
     for (const colorScheme of themes_at(width)) {
       await page.emulateMedia({ colorScheme });
       const at = `${what} at ${width}x${height}, ${colorScheme}`;
-      const scroll_width = await page.evaluate(() => document.documentElement.scrollWidth);
-      assert.ok(scroll_width <= width, `${at}: ${scroll_width} pixels wide`);
+      // Plots follow a moment later.
+      await until(`${at}: nothing is wider than the page`, async () => (await page.evaluate(() => document.documentElement.scrollWidth)) <= width);
       assert.deepEqual(await violations(page), [], at);
     }
   }

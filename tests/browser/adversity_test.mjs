@@ -1,7 +1,8 @@
 // Two pages that fight for one robot, every way in which a hand leaves a held control, a tab that is closed under it, and a
 // page that slept: whatever happens, one commands at a time, a duty ends, and nothing that was held is sent afterwards.
 import assert from 'node:assert/strict';
-import { Bench, run, until } from './programs.mjs';
+import { clear_by_script, held as held_by, hold_by_mouse, live, mode_of as mode, samples, sign_in as sign_in_by } from './hands.mjs';
+import { Bench, until } from './programs.mjs';
 
 const kRobot = 'rheo-1';
 const kPassword = 'correct horse battery';
@@ -14,21 +15,11 @@ const holder = async () => (await robot()).control?.holder ?? '';
 const control = (page) => page.locator('#control-line');
 const is_mine = async (page) => (await page.locator('#control-line.mine').count()) === 1;
 const shown_holder = (page) => control(page).getAttribute('data-holder');
-const mode = (page) => page.locator('.annunciator').getAttribute('data-mode');
 const runs = async () => Math.abs((await robot()).sample.duty) > 0.1;
 const rests = (what) => until(`the duty is 0: ${what}`, async () => (await robot()).sample.duty === 0);
-const live = (page) => until('samples arrive', async () => (await page.locator('.readouts.stale').count()) === 0);
 
 async function sign_in(page, user) {
-  await page.goto(bench.http);
-  const inside = page.locator('.annunciator h1').getByText(kRobot);
-  await until('signed in', async () => {
-    await page.fill('#user', user);
-    await page.fill('#password', kPassword);
-    await page.click('#sign-in');
-    await inside.or(page.locator('#sign-in-error:not(:empty)')).first().waitFor(); // a busy machine may be late with an answer
-    return (await inside.count()) === 1;
-  });
+  await sign_in_by(page, bench.http, user, kPassword, page.locator('.annunciator h1').getByText(kRobot));
   await live(page);
 }
 
@@ -39,30 +30,12 @@ async function enter_setpoint(page, setpoint_mm, is_offered = true) {
   await page.press('#setpoint-entry', 'Enter');
 }
 
-// Until the robot's motor runs by this hand. A machine that stands still lets a lease lapse; then it is let go and held anew.
-async function held(page, begin, end) {
-  for (let attempt = 0; attempt < 6; ++attempt) {
-    await begin();
-    if (await until('the duty runs', runs, 4000).catch(() => false)) return;
-    await end();
-    await live(page);
-  }
-  assert.fail('the duty never ran');
-}
-const by_mouse = (page) =>
-  held(page, () => page.locator('#hold-to-run').hover().then(() => page.mouse.down()), () => page.mouse.up());
+const by_mouse = (page) => hold_by_mouse(page, runs);
 const by_key = (page) =>
-  held(page, () => page.focus('#hold-to-run').then(() => page.keyboard.down(' ')), () => page.keyboard.up(' '));
+  held_by(page, runs, () => page.focus('#hold-to-run').then(() => page.keyboard.down(' ')), () => page.keyboard.up(' '));
 
 // For another second of samples.
-async function nothing_moves(what) {
-  const { next_seq } = await robot();
-  await until(`another second of samples (${what})`, async () => {
-    const now = await robot();
-    assert.equal(now.sample.duty, 0, what);
-    return now.next_seq >= next_seq + 100;
-  });
-}
+const nothing_moves = (what) => samples(bench, kRobot, 100, ({ sample }) => assert.equal(sample.duty, 0, what));
 
 // Nobody is in control, in manual, with the motor off.
 async function at_rest(page) {
@@ -96,8 +69,7 @@ async function only_commands(page, other, setpoint_mm) {
     await page.locator('#setpoint-outcome:is(.done, .failed)').waitFor();
     return (await page.locator('#setpoint-outcome.done').count()) === 1; // one that is too old is refused on a slow machine
   });
-  const now = await robot();
-  assert.ok(Math.abs(now.setpoint_m - setpoint_mm / 1000) < 1e-6, `${now.setpoint_m} m`);
+  await until(`${setpoint_mm} mm is in force`, async () => Math.abs((await robot()).setpoint_m - setpoint_mm / 1000) < 1e-6);
 }
 
 // ---- a page that sleeps
@@ -210,8 +182,10 @@ const steps = {
     await until('ben’s button does not say that it runs', async () => (await ben.locator('#hold-to-run.running').count()) === 0);
     await nothing_moves('ben still holds his button');
     await ben.mouse.up();
-    const { events } = await bench.ask(`/robots/${kRobot}/events?limit=100`);
-    assert.ok(events.some((event) => JSON.stringify(event).includes('ben has left the room')), 'the reason is kept');
+    await until('the reason is kept', async () => {
+      const { events } = await bench.ask(`/robots/${kRobot}/events?limit=100`);
+      return events.some((event) => JSON.stringify(event).includes('ben has left the room'));
+    });
     await at_rest(anna);
   },
 
@@ -241,9 +215,8 @@ const steps = {
       await page.click('#open-robot');
       assert.equal(await page.locator('#hold-to-run.running').count(), 0, what);
     }
-    const { emergency_id } = await robot();
     await at_rest(ben);
-    assert.equal((await bench.post(`/robots/${kRobot}/commands`, { kind: 'clear_emergency', emergency_id })).status, 200);
+    await clear_by_script(bench, kRobot);
     await bench.post(`/robots/${kRobot}/control`, { action: 'release' });
   },
 
@@ -329,6 +302,9 @@ const steps = {
   },
 };
 
-await run(bench, steps, async () => {
+// A Chromium of its own: it is stopped as a whole.
+const open_pages = async () => {
   await bench.open_browser();
-});
+};
+
+export const story = { bench, steps, open: open_pages };

@@ -3,7 +3,8 @@
 //
 // A view is found by its link, a part that opens by aria-expanded or <summary>; so a new one is walked as well.
 import assert from 'node:assert/strict';
-import { Bench, run, until } from './programs.mjs';
+import { go_to, live, samples } from './hands.mjs';
+import { Bench, until } from './programs.mjs';
 
 const kRobot = 'sim-1';
 const kFocusable = 'button, input, select, textarea, a[href], summary, [tabindex], [contenteditable]';
@@ -68,12 +69,16 @@ const focus = (probe) =>
     return control !== null && document.activeElement === control;
   }, probe);
 
-// One press of Escape has left the page once by each way, and under one key, when this returns.
+// One press of Escape has left the page once by each way, and under one key, when this returns. An earlier press that the
+// page sends again meanwhile, since the station was late with its answer, has its own key.
 async function escape_stops(what) {
-  const before = await page.evaluate(() => [window.stops.http.length, window.stops.socket.length]);
+  const before = await page.evaluate(() => ({ http: [...window.stops.http], socket: [...window.stops.socket] }));
   await page.keyboard.press('Escape');
   presses += 1;
-  const { http, socket } = await page.evaluate(([http, socket]) => ({ http: window.stops.http.slice(http), socket: window.stops.socket.slice(socket) }), before);
+  const { http, socket } = await page.evaluate((before) => {
+    const since = (way) => window.stops[way].slice(before[way].length).filter((key) => !before[way].includes(key));
+    return { http: since('http'), socket: since('socket') };
+  }, before);
   assert.deepEqual([http.length, socket.length], [1, 1], `${what}: one stop, by both ways`);
   assert.equal(http[0], socket[0], `${what}: it is one`);
 }
@@ -150,11 +155,10 @@ const steps = {
     bench.start_robot(kRobot);
     await page.goto(await bench.login_link());
     await page.locator('.annunciator h1').getByText(kRobot).waitFor();
-    await until('samples arrive', async () => (await page.locator('.readouts.stale').count()) === 0);
+    await live(page);
     const begun = await bench.post('/runs', { robot_id: kRobot, name: 'over' });
     assert.equal(begun.status, 201, JSON.stringify(begun.answer));
-    const { next_seq } = await bench.ask(`/robots/${kRobot}`);
-    await until('a second is recorded', async () => (await bench.ask(`/robots/${kRobot}`)).next_seq > next_seq + 100);
+    await samples(bench, kRobot, 100);
     assert.equal((await bench.post(`/runs/${begun.answer.run_id}/end`)).status, 200);
     const { status, answer } = await bench.post('/experiments', { robot_id: kRobot, profile: 'figure_7' });
     assert.equal(status, 202, JSON.stringify(answer));
@@ -172,7 +176,7 @@ const steps = {
       for (const address of addresses) {
         const is_first = address === `#/${view}`;
         if (!is_first) {
-          await page.evaluate((address) => (location.hash = address), address);
+          await go_to(page, address);
           await loaded();
         }
         for (const found of await links_of(view)) if (addresses.size <= kAddresses) addresses.add(found);
@@ -198,15 +202,18 @@ const steps = {
   },
 
   async 'the robot is latched, and the page made no error of its own'() {
-    const robot = await bench.ask(`/robots/${kRobot}`);
-    assert.equal(robot.mode, 'emergency');
-    assert.equal(robot.sample.duty, 0);
+    await until('it is latched, with its motor off', async () => {
+      const { mode, sample } = await bench.ask(`/robots/${kRobot}`);
+      return mode === 'emergency' && sample.duty === 0;
+    });
     assert.deepEqual(faults, []);
   },
 };
 
-await run(bench, steps, async () => {
-  page = await bench.open_browser({ viewport: { width: 1440, height: 900 }, colorScheme: 'dark' });
+const open_pages = async () => {
+  page = await bench.open_page({ viewport: { width: 1440, height: 900 }, colorScheme: 'dark' });
   await page.addInitScript(count_stops);
   page.on('pageerror', (error) => faults.push(error.message));
-});
+};
+
+export const story = { bench, steps, open: open_pages };

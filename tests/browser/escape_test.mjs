@@ -1,14 +1,13 @@
 // Escape stops the robot also when something on the page would take the key, once for each press; Space never does. Each
 // control of each view: escape_everywhere_test.mjs.
 import assert from 'node:assert/strict';
-import { Bench, clear_latch, run, until } from './programs.mjs';
+import { clear_latch, engage_auto, hold_by_mouse, live, mode_of, samples, seen_mode, shows } from './hands.mjs';
+import { Bench, until } from './programs.mjs';
 
 const kRobot = 'rheo-1';
 const bench = new Bench();
 let page;
 
-const mode = () => page.locator('.annunciator').getAttribute('data-mode');
-const seen_mode = (wanted) => until(`the page shows ${wanted}`, async () => (await mode()) === wanted);
 const robot = () => bench.ask(`/robots/${kRobot}`);
 const stops = async () =>
   (await bench.ask(`/robots/${kRobot}/commands?limit=1000`)).commands.filter((command) => command.kind === 'emergency_stop').length;
@@ -23,19 +22,12 @@ async function escape_stops(what, press = () => page.keyboard.press('Escape')) {
   assert.equal(await stops(), before + 1, `${what}: one stop`);
 }
 
-async function engage_auto() {
-  await page.locator('#send-setpoint:enabled').waitFor();
-  await page.fill('#setpoint-entry', '40');
-  await page.press('#setpoint-entry', 'Enter');
-  await seen_mode('auto');
-}
-
 const steps = {
   async 'the page opens no menu of the browser'() {
     await page.goto(await bench.login_link());
     bench.start_robot(kRobot);
     await page.locator('.annunciator h1').getByText(kRobot).waitFor();
-    await until('samples arrive', async () => (await page.locator('.readouts.stale').count()) === 0);
+    await live(page);
     const kept_shut = await page.evaluate(() => new Promise((done) => {
       addEventListener('contextmenu', (event) => done(event.defaultPrevented), { once: true });
       document.querySelector('#run-name').dispatchEvent(new MouseEvent('contextmenu', { bubbles: true, cancelable: true }));
@@ -45,15 +37,12 @@ const steps = {
 
   async 'Escape stops a robot that runs, from each control of auto and manual'() {
     for (const id of ['setpoint-entry', 'run-name', 'duty-entry', 'run-fluid', 'to-manual', 'stop-all', 'show-keys']) {
-      await engage_auto();
+      await engage_auto(page, 40);
       await page.focus(`#${id}`);
       await escape_stops(`${id} focused, in auto`);
       await clear_latch(page);
     }
-    const hold = page.locator('#hold-to-run');
-    await hold.hover();
-    await page.mouse.down();
-    await until('the duty runs', async () => (await robot()).sample.duty > 0.1);
+    await hold_by_mouse(page, async () => (await robot()).sample.duty > 0.1);
     await escape_stops('a duty held');
     await page.mouse.up();
     await until('the motor is off', async () => (await robot()).sample.duty === 0);
@@ -66,12 +55,12 @@ const steps = {
     await list.waitFor();
     await escape_stops('the list of fluids open');
     await list.waitFor({ state: 'hidden' });
-    assert.equal(await page.evaluate(() => document.activeElement.id), 'run-fluid', 'the focus stays');
+    await until('the focus stays', () => page.evaluate(() => document.activeElement.id === 'run-fluid'));
     await page.keyboard.press('w');
-    assert.equal(await page.locator('#run-fluid-list .at').innerText(), 'water');
+    await shows(page, '#run-fluid-list .at', 'water');
     await page.keyboard.press('Enter');
     await list.waitFor({ state: 'hidden' });
-    assert.equal(await page.locator('#run-fluid').innerText(), 'water');
+    await shows(page, '#run-fluid', 'water');
     await page.waitForFunction(async () => (await (await fetch('/api/v1/robots/rheo-1')).json()).fluid === 'water');
     await page.click('#run-fluid');
     await page.locator('#run-fluid-list [role=option]').first().click();
@@ -126,7 +115,7 @@ const steps = {
   },
 
   async 'Space never stops, not even on a button that stops; Enter does'() {
-    await engage_auto();
+    await engage_auto(page, 40);
     const before = await stops();
     for (const id of ['emergency-stop', 'stop-all']) {
       await page.focus(`#${id}`);
@@ -138,16 +127,17 @@ const steps = {
     assert.equal(await page.inputValue('#run-name'), ' ', 'it belongs to text');
     await page.evaluate(() => document.activeElement.blur());
     await page.keyboard.press(' ');
-    const then = (await robot()).next_seq;
-    await until('another second', async () => (await robot()).next_seq >= then + 100);
+    await samples(bench, kRobot, 100);
     assert.equal(await stops(), before);
-    assert.equal(await mode(), 'auto');
+    assert.equal(await mode_of(page), 'auto');
     await page.focus('#emergency-stop');
     await escape_stops('Enter on the button', () => page.keyboard.press('Enter'));
-    await seen_mode('emergency');
+    await seen_mode(page, 'emergency');
   },
 };
 
-await run(bench, steps, async () => {
-  page = await bench.open_browser({ viewport: { width: 1440, height: 900 }, colorScheme: 'dark' });
-});
+const open_pages = async () => {
+  page = await bench.open_page({ viewport: { width: 1440, height: 900 }, colorScheme: 'dark' });
+};
+
+export const story = { bench, steps, open: open_pages };

@@ -3,7 +3,8 @@
 import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
 import { createRequire } from 'node:module';
-import { Bench, run, until } from './programs.mjs';
+import { samples, shows as says } from './hands.mjs';
+import { Bench, until } from './programs.mjs';
 
 const kRobot = 'rheo-1';
 const axe = readFileSync(createRequire(new URL('../../web/package.json', import.meta.url)).resolve('axe-core/axe.min.js'), 'utf8');
@@ -81,10 +82,10 @@ const steps = {
     await page.click('#profile-figure_7');
     const figures = page.locator('.plan-figures');
     await until('the prediction is there', async () => /0 to 15\d mm/.test(await figures.innerText().catch(() => '')));
-    assert.match(await figures.innerText(), /Takes\s+40 s/);
+    await says(page, '.plan-figures', /Takes\s+40 s/);
     await until('nothing is in the way', async () => (await page.locator('#checks .ok').count()) === 6);
     assert.equal(await page.locator('#checks .waits').count(), 0);
-    assert.match(await page.locator('#presence').innerText(), /This page must stay open/);
+    await says(page, '#presence', /This page must stay open/);
     await fits('to begin one');
   },
 
@@ -103,9 +104,9 @@ const steps = {
     await until('the page can read it', async () => (await fault.getAttribute('data-line')) === '');
     await page.locator('#start-experiment:enabled').click();
     await until('the station names the line', async () => (await fault.getAttribute('data-line')) !== '');
-    assert.match(await fault.innerText(), /^Line \d+: .*setpoint_m is 0\.7/);
+    await says(page, '#profile-fault', /^Line \d+: .*setpoint_m is 0\.7/);
     const line = Number(await fault.getAttribute('data-line'));
-    assert.ok(await page.locator('.editor li').nth(line - 1).evaluate((entry) => entry.classList.contains('wrong')));
+    await until('the line is marked', () => page.locator('.editor li').nth(line - 1).evaluate((entry) => entry.classList.contains('wrong')));
     assert.deepEqual((await bench.ask('/experiments')).experiments, [], 'nothing was begun');
     await fits('a refused profile');
   },
@@ -116,7 +117,7 @@ const steps = {
     await page.locator('#experiment-notes').press('Enter');
     await page.reload();
     await page.locator('#start-experiment').waitFor();
-    await page.waitForTimeout(300);
+    await samples(bench, kRobot, 100);
     assert.deepEqual((await bench.ask('/experiments')).experiments, []);
   },
 
@@ -133,27 +134,27 @@ const steps = {
     await records.nth(1).waitFor();
     assert.equal(await records.first().getAttribute('href'), `#/runs/${runs[0].run_id}`);
     const plotted = page.locator('#run-plot h2');
-    assert.equal(await plotted.innerText(), 'Run 2');
+    await says(page, '#run-plot h2', 'Run 2');
     await page.locator('#experiment-runs th a').first().click();
     await plotted.getByText('Run 1').waitFor();
     await page.locator('#run-plot .track-key.measured').waitFor();
-    assert.match(page.url(), /#\/experiments\/\d+\?run=1$/);
+    await page.waitForURL(/#\/experiments\/\d+\?run=1$/);
     await fits('one that is done');
   },
 
   async 'one that runs shows how far it is, pauses, resumes and is aborted'() {
     await is_at_rest();
-    await paste(profile('Long', 60));
+    await paste(profile('Long', 600)); // it is aborted; a busy machine looks at it for long
     const id = await start();
     await shows('running');
-    await until('its progress is shown', async () => /Run 1 of 1, [1-9]\d* of 60 s/.test(await page.locator('#experiment-progress').innerText().catch(() => '')));
+    await until('its progress is shown', async () => /Run 1 of 1, [1-9]\d* of 600 s/.test(await page.locator('#experiment-progress').innerText().catch(() => '')));
     await page.locator('#run-plot .track').waitFor();
-    assert.match(await page.locator('#presence').innerText(), /in the name of this page, which must stay open/);
+    await says(page, '#presence', /in the name of this page, which must stay open/);
     await fits('one that runs');
     await page.click('#pause-experiment');
     await shows('paused');
     await until('the robot rests', async () => (await robot()).mode === 'manual');
-    assert.match(await page.locator('#situation').innerText(), /Somebody asked for it/);
+    await says(page, '#situation', /Somebody asked for it/);
     await page.click('#resume-experiment');
     await shows('running');
     await until('the robot moves again', async () => (await robot()).mode === 'auto');
@@ -161,18 +162,18 @@ const steps = {
     await shows('aborted');
     await until('the robot rests', async () => (await robot()).mode === 'manual');
     assert.equal((await experiment(id)).reason, 'requested');
-    assert.equal(await page.locator('.acts button').count(), 0);
+    await until('nothing more can be done with it', async () => (await page.locator('.acts button').count()) === 0);
   },
 
   async 'the stop stops an experiment, from this page as from every other'() {
     await is_at_rest();
-    await paste(profile('Stopped', 60));
+    await paste(profile('Stopped', 600));
     await start();
     await shows('running');
     await page.keyboard.press('Escape');
     await shows('aborted');
-    assert.equal((await robot()).mode, 'emergency');
-    assert.match(await page.locator('#situation').innerText(), /Somebody stopped the robot|The robot was in emergency/);
+    await until('the robot is latched', async () => (await robot()).mode === 'emergency');
+    await says(page, '#situation', /Somebody stopped the robot|The robot was in emergency/);
     await go(`/new?profile=figure_7&robot=${kRobot}`);
     await until('the check list says so', async () => /emergency\. Look at the robot, then clear/.test(await page.locator('#check-rest').innerText().catch(() => '')));
     await page.locator('#start-experiment', { hasText: 'Put into the queue' }).waitFor();
@@ -190,14 +191,14 @@ const steps = {
     const queue = page.locator(`#queue-${kRobot} .queue-list li`);
     const order = async () => Promise.all((await queue.all()).map((entry) => entry.getAttribute('data-experiment').then(Number)));
     await until('all wait', async () => (await queue.count()) === 3);
-    assert.deepEqual(await order(), ids);
-    assert.match(await queue.first().innerText(), /The robot is in emergency/);
+    await until('in their order', async () => String(await order()) === String(ids));
+    await until('and why', async () => /The robot is in emergency/.test(await queue.first().innerText()));
     await queue.nth(2).locator('.step-up').click();
     await until('the third is second', async () => String(await order()) === String([ids[0], ids[2], ids[1]]));
     await queue.nth(0).locator('.step-down').click();
     await until('the third is first', async () => String(await order()) === String([ids[2], ids[0], ids[1]]));
     await until('the station has the same first', async () => (await experiment(ids[2])).waits_for === 'emergency');
-    assert.equal((await experiment(ids[0])).waits_for, 'others');
+    await until('and what was first waits for it', async () => (await experiment(ids[0])).waits_for === 'others');
     await fits('the queue');
     for (let left = 3; left > 0; --left) {
       await queue.first().locator('.ends').click();
@@ -205,7 +206,7 @@ const steps = {
     }
     const ended = page.locator('#history tbody tr');
     await until('all are in the history, newest first', async () => (await ended.first().locator('th').innerText()) === String(ids[2]));
-    assert.match(await ended.first().innerText(), /Cancelled/);
+    await until('how it has ended', async () => /Cancelled/.test(await ended.first().innerText()));
     await fits('history');
   },
 
@@ -215,20 +216,20 @@ const steps = {
     await page.fill('#from-clock', 'noon');
     await page.fill('#until-clock', '14:30');
     await page.click('#reserve');
-    assert.match(await page.locator('#reserve-problem').innerText(), /^From: “noon” is no time/);
+    await says(page, '#reserve-problem', /^From: “noon” is no time/);
     await page.fill('#from-clock', '12:00');
     await page.fill('#purpose', 'tubes of bed 3');
     await page.locator('#purpose').press('Enter');
     const list = page.locator('.reservation-list li');
     await until('it is listed', async () => (await list.count()) === 1);
-    assert.match(await list.innerText(), /12:00 to .* 14:30\s+for you: tubes of bed 3/);
+    await says(page, '.reservation-list li', /12:00 to .* 14:30\s+for you: tubes of bed 3/);
     await until('it is in the bars', async () => (await page.locator('#day-bars rect.mine').count()) === 1);
     const [{ from_us, until_us }] = (await bench.ask('/reservations?over=false')).reservations;
     assert.equal((until_us - from_us) / 3600e6, 2.5);
     await fits('reservations');
     await list.getByRole('button').click();
     await until('it is gone', async () => (await list.count()) === 0);
-    assert.deepEqual((await bench.ask('/reservations?over=false')).reservations, []);
+    await until('also at the station', async () => (await bench.ask('/reservations?over=false')).reservations.length === 0);
   },
 
   async 'nothing can be started while the page is cut off, and the last state is not shown as present'() {
@@ -239,8 +240,8 @@ const steps = {
     try {
       await page.clock.runFor(3000);
       await page.locator('#start-experiment:disabled').waitFor();
-      assert.match(await page.locator('#start-note').innerText(), /Cut off from the station/);
-      assert.equal(await page.locator('#checks').count(), 0);
+      await says(page, '#start-note', /Cut off from the station/);
+      await page.locator('#checks').waitFor({ state: 'detached' });
     } finally {
       bench.station.process.kill('SIGCONT');
     }
@@ -251,6 +252,8 @@ const steps = {
   },
 };
 
-await run(bench, steps, async () => {
-  page = await bench.open_browser({ viewport: { width: 1440, height: 900 }, colorScheme: 'dark' });
-});
+const open_pages = async () => {
+  page = await bench.open_page({ viewport: { width: 1440, height: 900 }, colorScheme: 'dark' });
+};
+
+export const story = { bench, steps, open: open_pages };

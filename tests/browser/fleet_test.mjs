@@ -1,7 +1,8 @@
 // Many robots and several people: who may clear a latch, what is said of a stop of hundreds, robots that are hidden, and
 // robots whose samples nobody asked for.
 import assert from 'node:assert/strict';
-import { Bench, clear_latch, run, until } from './programs.mjs';
+import { clear_latch, mode_of as mode, samples, shows, sign_in as sign_in_by, take_control } from './hands.mjs';
+import { Bench, until } from './programs.mjs';
 
 const kRobot = 'rheo-1';
 const kPassword = 'correct horse battery';
@@ -11,15 +12,11 @@ const bench = new Bench();
 let admin, operator, viewer;
 
 const robot = (id = kRobot) => bench.ask(`/robots/${id}`);
-const mode = (page) => page.locator('.annunciator').getAttribute('data-mode');
 const entry = (page, id) => page.locator('.robot-entry', { has: page.getByText(id, { exact: true }) });
 const listed = async (page) => (await page.locator('.robot-entry .name').allInnerTexts()).sort();
 
 async function sign_in(page, user) {
-  await page.goto(bench.http);
-  await page.fill('#user', user);
-  await page.fill('#password', kPassword);
-  await page.click('#sign-in');
+  await sign_in_by(page, bench.http, user, kPassword, entry(page, kRobot));
   await entry(page, kRobot).click();
   await page.locator('.annunciator h1').getByText(kRobot).waitFor();
 }
@@ -75,10 +72,7 @@ const steps = {
   },
 
   async 'everybody sees who is in control'() {
-    await until('olga is in control', async () => {
-      await operator.click('#take-control', { timeout: 500 }).catch(() => {});
-      return ((await robot()).control?.holder ?? '').includes('olga');
-    });
+    await take_control(operator, async () => ((await robot()).control?.holder ?? '').includes('olga'));
     for (const page of [viewer, admin]) {
       await until('it is shown', async () => /olga.* is in control/.test(await page.locator('#control-line').innerText()));
     }
@@ -91,9 +85,10 @@ const steps = {
       const button = page.locator('#clear-emergency');
       await button.waitFor();
       assert.ok(await button.isDisabled());
-      assert.match(await page.locator('#latch').innerText(), /olga.* is in control and may clear it/);
+      await shows(page, '#latch', /olga.* is in control and may clear it/);
       await hold(page, '#clear-emergency', 1300);
     }
+    await samples(bench, kRobot, 100);
     assert.equal((await robot()).mode, 'emergency');
     await clear_latch(operator);
   },
@@ -104,7 +99,7 @@ const steps = {
     await viewer.click('#emergency-stop');
     await viewer.locator('#clear-emergency').waitFor();
     assert.ok(await viewer.locator('#clear-emergency').isDisabled());
-    assert.match(await viewer.locator('#latch').innerText(), /An operator may clear it/);
+    await shows(viewer, '#latch', /An operator may clear it/);
     await clear_latch(operator);
   },
 
@@ -116,8 +111,7 @@ const steps = {
     assert.equal(await unwatched.locator('.figure, .dot.good').count(), 0);
     assert.doesNotMatch((await unwatched.allInnerTexts()).join(), /–|mm/);
     await entry(admin, 'tank-3').click();
-    await until('what is looked at has a position', async () => (await entry(admin, 'tank-3').locator('.figure').count()) === 1);
-    assert.match(await entry(admin, 'tank-3').locator('.figure').innerText(), /± \d+\.\d mm/);
+    await until('what is looked at has a position', async () => /± \d+\.\d mm/.test(await entry(admin, 'tank-3').locator('.figure').innerText()));
     await entry(admin, kRobot).click();
   },
 
@@ -126,11 +120,11 @@ const steps = {
     for (const id of ['tank-1', 'tank-2']) await admin.getByRole('button', { name: `Hide ${id}`, exact: true }).click();
     await admin.click('#edit-robots');
     const hidden = async () => !(await listed(admin)).some((name) => ['tank-1', 'tank-2'].includes(name));
-    assert.ok(await hidden());
+    await until('they are hidden', hidden);
     await admin.reload();
     await until('all others are listed', async () => (await listed(admin)).length === kFleet - 1);
     assert.ok(await hidden());
-    assert.equal(await admin.locator('#edit-robots').innerText(), '2 hidden');
+    await shows(admin, '#edit-robots', '2 hidden');
     assert.ok((await listed(operator)).includes('tank-1'));
   },
 
@@ -144,7 +138,7 @@ const steps = {
       assert.notEqual(emergency_id, null);
     }
     await until('the hidden ones call', async () => (await admin.locator('#edit-robots').innerText()) === '2 hidden 2 in emergency');
-    assert.match(await admin.title(), /^EMERGENCY 13 robots/);
+    await until('so does the title', async () => /^EMERGENCY 13 robots/.test(await admin.title()));
   },
 
   async 'the outcome of a stop of hundreds leaves "clear" in reach at every size'() {
@@ -173,14 +167,16 @@ const steps = {
       assert.ok(found.line_px <= 80, `${found.line_px} px of outcome at ${width} × ${height}`);
     }
     await clear_latch(large);
-    assert.equal((await robot()).mode, 'manual');
+    await until('the station knows it', async () => (await robot()).mode === 'manual');
     await large.click('#edit-robots');
     await large.click('#hide-away');
     await large.click('#edit-robots');
-    assert.equal(await large.locator('.robot-entry').count(), kFleet + 1);
+    await until('only those that are there', async () => (await large.locator('.robot-entry').count()) === kFleet + 1);
   },
 };
 
-await run(bench, steps, async () => {
-  admin = await bench.open_browser({ viewport: { width: 1440, height: 900 }, colorScheme: 'dark' });
-});
+const open_pages = async () => {
+  admin = await bench.open_page({ viewport: { width: 1440, height: 900 }, colorScheme: 'dark' });
+};
+
+export const story = { bench, steps, open: open_pages };

@@ -1,7 +1,7 @@
-// The real programs that the browser test drives: station, simulated robot and Chromium, each ended by its own id.
+// The real programs that a story of the page drives: station, simulated robot and Chromium, each ended by its own id.
 import { spawn } from 'node:child_process';
 import { once } from 'node:events';
-import { mkdirSync, mkdtempSync, readFileSync, rmSync } from 'node:fs';
+import { mkdtempSync, readFileSync, rmSync } from 'node:fs';
 import { createRequire } from 'node:module';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
@@ -42,39 +42,6 @@ export function read_json(file) {
   }
 }
 
-// Holds the button that clears the latch until the robot is in manual. A browser that draws without a graphics card may
-// stand still for so long that what it shows is no longer current; then the hold ends, as it must, and is begun again.
-export async function clear_latch(page) {
-  const button = page.locator('#clear-emergency');
-  const is_manual = async () => (await page.locator('.annunciator').getAttribute('data-mode')) === 'manual';
-  await page.locator('#latch').waitFor();
-  await until('the latch is cleared', async () => {
-    if (await is_manual()) return true;
-    if ((await button.count()) === 0 || !(await button.isEnabled())) return false;
-    await button.hover();
-    await page.mouse.down();
-    await until('manual', is_manual, 3000).catch(() => undefined);
-    await page.mouse.up();
-    return is_manual();
-  });
-}
-
-// How much of the estimate's trace, the brightest colour of the dark page, is in a share of the first strip.
-export const trace_pixels = (page, from, to) =>
-  page.evaluate(
-    ([from, to]) => {
-      const canvas = document.querySelector('.strip-0 canvas');
-      const ratio = devicePixelRatio;
-      const [left, width] = [58 * ratio, canvas.width - 76 * ratio];
-      const x = Math.round(left + from * width);
-      const image = canvas.getContext('2d').getImageData(x, 20 * ratio, Math.max(1, Math.round((to - from) * width)), canvas.height - 60 * ratio);
-      let bright = 0;
-      for (let at = 0; at < image.data.length; at += 4) if (image.data[at] > 225 && image.data[at + 1] > 225 && image.data[at + 3] > 200) bright += 1;
-      return bright;
-    },
-    [from, to],
-  );
-
 const kLongestEnd_ms = 30_000;
 
 class Program {
@@ -106,17 +73,29 @@ class Program {
   }
 }
 
-// A folder for one station; the station can be killed and started again on the same ports.
+export const open_chromium = () => chromium.launch(kChromium);
+
+// Chromium may never answer that it is closed; it ends with this program.
+export async function close_chromium(browser) {
+  const closed = browser.close().then(() => true, () => true);
+  if (!(await Promise.race([closed, delay(kLongestEnd_ms, false, { ref: false })]))) console.error('the browser did not close');
+}
+
+// A folder for one station; the station can be killed and started again on the same ports. Its pages are in a Chromium
+// that is given to it, which others may use as well, or in one of its own.
 export class Bench {
-  data = mkdtempSync(join(tmpdir(), 'rheonaut-browser-'));
+  data = null;
   endpoints = null;
   station = null;
   robot = null;
   fleet = null;
   proxy = null;
   browser = null;
+  has_own_browser = false;
+  contexts = [];
 
   async start_station() {
+    this.data ??= mkdtempSync(join(tmpdir(), 'rheonaut-browser-'));
     const { http = '127.0.0.1:0', robots = '127.0.0.1:0' } = this.endpoints ?? {};
     const file = join(this.data, 'endpoints.json');
     this.station = new Program('rheonaut', 'serve', '--data', this.data, '--http', http, '--robots', robots,
@@ -166,13 +145,19 @@ export class Bench {
   // Another page, of a browser of its own as far as cookies go.
   async open_page(options) {
     const context = await this.browser.newContext(options);
+    this.contexts.push(context);
     context.setDefaultTimeout(kLongestWait_ms);
     return context.newPage();
   }
 
   async open_browser(options) {
-    this.browser = await chromium.launch(kChromium);
+    this.browser = await open_chromium();
+    this.has_own_browser = true;
     return this.open_page(options);
+  }
+
+  get pages() {
+    return this.contexts.flatMap((context) => context.pages());
   }
 
   get http() {
@@ -195,40 +180,10 @@ export class Bench {
   }
 
   async close() {
-    // Chromium may never answer that it is closed; it ends with this program.
-    const closed = this.browser?.close().then(() => true, () => true);
-    if (closed && !(await Promise.race([closed, delay(kLongestEnd_ms, false)]))) console.error('the browser did not close');
-    await this.proxy?.end();
-    await this.robot?.end();
-    await this.fleet?.end();
+    if (this.has_own_browser) await close_chromium(this.browser);
+    else await Promise.race([Promise.allSettled(this.contexts.map((context) => context.close())), delay(kLongestEnd_ms)]);
+    await Promise.all([this.proxy?.end(), this.robot?.end(), this.fleet?.end()]);
     await this.station?.end();
-    rmSync(this.data, { recursive: true, force: true });
+    if (this.data) rmSync(this.data, { recursive: true, force: true });
   }
-}
-
-// Runs the steps in order, in a browser that `open` opens, and ends this program: 1 when one of them failed.
-export async function run(bench, steps, open) {
-  let failed = false;
-  try {
-    await bench.start_station();
-    await open();
-    for (const [name, step] of Object.entries(steps)) {
-      const start_ms = performance.now();
-      await step();
-      console.log(`ok  ${name} (${Math.round(performance.now() - start_ms)} ms)`);
-    }
-  } catch (error) {
-    failed = true;
-    console.error(error);
-    const out = new URL('out/', import.meta.url).pathname;
-    mkdirSync(out, { recursive: true });
-    const pages = bench.browser?.contexts().flatMap((context) => context.pages()) ?? [];
-    for (const [number, page] of pages.entries()) {
-      await page.screenshot({ path: `${out}failed_${number}.png` }).catch(() => undefined);
-    }
-    console.error(`station:\n${bench.station?.output}\nrobot:\n${bench.robot?.output}\nfleet:\n${bench.fleet?.output}`);
-  } finally {
-    await bench.close();
-  }
-  process.exit(failed ? 1 : 0);
 }

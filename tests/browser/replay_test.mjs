@@ -1,11 +1,12 @@
 // A run that is replayed: its numbers are the recorded ones, it moves as it is told, and nothing in it acts on a robot but
 // the stop.
 //
-//   replay_test.mjs [--pictures FOLDER]
+//   stories.mjs [--pictures FOLDER] replay
 import assert from 'node:assert/strict';
 import { join } from 'node:path';
 import { assert_accessible } from './accessible.mjs';
-import { Bench, run, until } from './programs.mjs';
+import { clear_by_script, go_to, hold_by_mouse, samples, watch_attribute } from './hands.mjs';
+import { Bench, until } from './programs.mjs';
 
 const kRobot = 'rheo-1';
 const pictures_at = process.argv.indexOf('--pictures');
@@ -21,7 +22,7 @@ let recorded; // the samples of run 1
 const text = (selector) => page.locator(selector).first().innerText();
 const robot = () => bench.ask(`/robots/${kRobot}`);
 const picture = async (name) => pictures && page.screenshot({ path: join(pictures, `${name}.png`) });
-const open = (hash) => page.evaluate((next) => (location.hash = next), hash);
+const open = (hash) => go_to(page, hash);
 const query = () => new URLSearchParams(page.url().split('?')[1] ?? '');
 const at_s = () => Number(query().get('at'));
 const command_rows = async () => (await bench.ask(`/robots/${kRobot}/commands?limit=1000`)).commands.length;
@@ -30,10 +31,7 @@ const command = async (body) => {
   const { status, answer } = await bench.post(`/robots/${kRobot}/commands`, body);
   assert.equal(status, 200, JSON.stringify(answer));
 };
-const seconds = async (count) => {
-  const end = (await robot()).next_seq + count * 100;
-  await until(`${count} s of samples`, async () => (await robot()).next_seq >= end);
-};
+const seconds = (count) => samples(bench, kRobot, count * 100);
 
 // The sample at or next before a moment of the run.
 const sample_at = (moment_s) => {
@@ -69,7 +67,7 @@ const numerals = () =>
 async function assert_numerals(moment_s) {
   const wanted = numerals_of(sample_at(moment_s));
   await until(`the numerals of ${moment_s} s: ${JSON.stringify(wanted)}`, async () =>
-    JSON.stringify(await numerals()) === JSON.stringify(wanted), 10_000).catch(async (error) => {
+    JSON.stringify(await numerals()) === JSON.stringify(wanted)).catch(async (error) => {
     assert.deepEqual(await numerals(), wanted, `at ${moment_s} s (${error.message})`);
   });
 }
@@ -94,7 +92,7 @@ const steps = {
     await command({ kind: 'inject_disturbance', disturbance_m: -0.02 });
     await seconds(3);
     await bench.robot.end();
-    await page.waitForTimeout(2500);
+    await page.waitForTimeout(2500); // in which there is no robot
     bench.start_robot(kRobot);
     await until('it is back', async () => (await robot()).link === 'connected');
     await seconds(3);
@@ -153,7 +151,7 @@ const steps = {
   async 'what an address cannot mean is said with its value'() {
     await open('#/runs/1/replay?at=soon&speed=1000');
     await page.locator('#replay-note').getByText('“at=soon” in the address is no moment').waitFor();
-    await page.waitForTimeout(600);
+    await seconds(1);
     assert.match(await text('#replay-note'), /“at=soon”.*“speed=1000” in the address is no speed from 0\.1 to 100/, 'it stays until somebody moves');
     await assert_numerals(0);
   },
@@ -161,10 +159,10 @@ const steps = {
   async 'it plays ten times as fast, to the end'() {
     await open('#/runs/1/replay?at=0&speed=10');
     await assert_numerals(0);
+    const presses = await watch_attribute(page, '#replay-play', 'aria-pressed');
     const began_ms = performance.now();
     await page.locator('body').press(' ');
-    assert.equal(await page.getAttribute('#replay-play', 'aria-pressed'), 'true');
-    await until('it is at its end', async () => (await page.getAttribute('#replay-play', 'aria-pressed')) === 'false');
+    await until('it has begun, and is at its end', async () => (await presses()).join() === 'false,true,false');
     const took_s = (performance.now() - began_ms) / 1000;
     assert.ok(took_s > (length_s() / 10) * 0.9, `${took_s} s for ${length_s()} s`);
     await assert_numerals(length_s());
@@ -238,7 +236,7 @@ const steps = {
       }
     }
     for (const key of ['Shift+ArrowRight', 'Shift+ArrowLeft', 'Control+Enter', 'Shift+PageUp']) await page.keyboard.press(key);
-    await page.waitForTimeout(600);
+    await seconds(1);
     assert.equal(await command_rows(), rows);
     assert.deepEqual(posted, []);
     assert.equal((await robot()).control, null);
@@ -254,20 +252,17 @@ const steps = {
     assert.equal(await page.locator('#clear-emergency').count(), 0);
     assert.equal(await page.locator('.replay .annunciator').getAttribute('data-mode'), sample_at(3).mode);
     await assert_numerals(3);
-    await command({ kind: 'clear_emergency', emergency_id: (await robot()).emergency_id });
+    await clear_by_script(bench, kRobot);
     assert.equal((await bench.post(`/robots/${kRobot}/control`, { action: 'release' })).status, 200);
   },
 
   async 'a duty that is held ends when a replay is opened, and is not renewed from there'() {
     await open(`#/robot/${kRobot}`);
     await until('it can be driven', async () => (await page.locator('#hold-to-run:enabled').count()) === 1);
-    await page.hover('#hold-to-run');
-    await page.mouse.down();
-    await until('the duty runs', async () => Math.abs((await robot()).sample.duty) > 0.1);
+    await hold_by_mouse(page, async () => Math.abs((await robot()).sample.duty) > 0.1);
     await open('#/runs/1/replay?at=2');
     await until('the duty ends', async () => (await robot()).sample.duty === 0);
-    await page.waitForTimeout(700);
-    assert.equal((await robot()).sample.duty, 0);
+    await samples(bench, kRobot, 100, ({ sample }) => assert.equal(sample.duty, 0));
     await page.mouse.up();
   },
 
@@ -284,9 +279,11 @@ const steps = {
   },
 };
 
-await run(bench, steps, async () => {
-  page = await bench.open_browser({ viewport: { width: 1440, height: 900 }, colorScheme: 'dark' });
+const open_pages = async () => {
+  page = await bench.open_page({ viewport: { width: 1440, height: 900 }, colorScheme: 'dark' });
   page.on('pageerror', (error) => faults.push(error.message));
   page.on('console', (message) => /Content.Security.Policy|violates/i.test(message.text()) && faults.push(message.text()));
   page.on('request', (request) => request.method() !== 'GET' && posted.push(`${request.method()} ${request.url()}`));
-});
+};
+
+export const story = { bench, steps, open: open_pages };

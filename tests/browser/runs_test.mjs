@@ -1,11 +1,12 @@
 // The view of runs: the list and its filters, one run with its plots and files, several side by side.
 //
-//   runs_test.mjs [--pictures FOLDER]
+//   stories.mjs [--pictures FOLDER] runs
 import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { assert_accessible } from './accessible.mjs';
-import { Bench, run, until } from './programs.mjs';
+import { clear_by_script, go_to, samples, shows } from './hands.mjs';
+import { Bench, until } from './programs.mjs';
 
 const kRobot = 'rheo-1';
 const kMany = 230; // more than two pages of the list
@@ -26,10 +27,8 @@ const command = async (body) => {
   const { status, answer } = await bench.post(`/robots/${kRobot}/commands`, body);
   assert.equal(status, 200, JSON.stringify(answer));
 };
-const seconds = async (count) => {
-  const end = (await bench.ask(`/robots/${kRobot}`)).next_seq + count * 100;
-  await until(`${count} s of samples`, async () => (await bench.ask(`/robots/${kRobot}`)).next_seq >= end);
-};
+const seconds = (count) => samples(bench, kRobot, count * 100);
+const address_is = (wanted) => until(`the address is ${wanted}`, async () => (await hash()) === wanted);
 
 // A step in closed loop under a marker, with a disturbance.
 async function record(name, notes) {
@@ -49,9 +48,7 @@ async function record(name, notes) {
   return made.answer.run_id;
 }
 
-async function open(address) {
-  await page.evaluate((next) => (location.hash = next), address);
-}
+const open = (address) => go_to(page, address);
 
 // How many colours a plot has: a plot without a trace has few.
 const colours = (selector) =>
@@ -108,19 +105,19 @@ const steps = {
     await record('Step again', '');
     await until('both are listed', async () => (await rows()) === 2);
     assert.deepEqual(await names(), ['#2 Step again', '#1 Step in water']);
-    assert.match(await text('[data-run="1"] .is-record'), /complete/);
+    await shows(page, '[data-run="1"] .is-record', /complete/);
   },
 
   async 'the list is searched, and what is searched stands in the address'() {
     await page.fill('#filter-q', 'pump warm');
     await until('one is left', async () => (await rows()) === 1);
     assert.deepEqual(await names(), ['#1 Step in water']);
-    assert.equal(await hash(), '#/runs?q=pump+warm');
+    await address_is('#/runs?q=pump+warm');
     await page.fill('#filter-q', '');
     await page.click('#filter-fluid');
     await page.locator('#filter-fluid-list [role=option]', { hasText: 'non-Newtonian' }).click();
     await page.locator('#no-match').waitFor();
-    assert.equal(await hash(), '#/runs?fluid=non_newtonian');
+    await address_is('#/runs?fluid=non_newtonian');
     await page.fill('#filter-from', '26/11');
     await page.press('#filter-from', 'Enter');
     await page.locator('#filter-problem').getByText('“26/11” is no date').waitFor();
@@ -134,7 +131,7 @@ const steps = {
     const digest = (await bench.ask('/runs/1/certificate')).sha256;
     assert.equal((await text('#digest')).replaceAll(/\s/g, ''), digest);
     await until('the plot has traces', async () => (await colours('.strip.position')) > 20);
-    assert.ok((await colours('.strip.duty')) > 5);
+    await until('so has the one of the duty', async () => (await colours('.strip.duty')) > 5);
     await page.locator('#moments').getByText('light on').waitFor();
     await page.locator('#moments').getByText('setpoint 50 mm').waitFor();
     await page.locator('#moments').getByText('disturbance −20 mm').waitFor();
@@ -157,7 +154,7 @@ const steps = {
       return /±/.test(value) && value;
     });
     assert.match(said, /^(49|50)\.\d.* ± \d.*, setpoint 50\.0 mm$/);
-    assert.match(await text('.strip.impedance .cursor'), /mV$/);
+    await shows(page, '.strip.impedance .cursor', /mV$/);
     await picture('run');
   },
 
@@ -171,7 +168,7 @@ const steps = {
   },
 
   async 'dragging over one plot shows that stretch in all, finer, and the address leads back to it'() {
-    assert.match(await text('#plot-source'), /every sample|a point/);
+    await shows(page, '#plot-source', /every sample|a point/);
     await drag('.strip.duty', 0.25, 0.5);
     await until('the range stands in the address', async () => /from=\d+&to=\d+/.test(await hash()));
     const zoomed = await hash();
@@ -180,11 +177,11 @@ const steps = {
     const duration_s = await plotted_s();
     assert.ok(Math.abs(Number(from_s) - duration_s * 0.25) < 0.2 && Math.abs(Number(to_s) - duration_s * 0.5) < 0.2, `${from_s} ${to_s}`);
     await page.click('#whole-run');
-    assert.equal(await hash(), '#/runs/1');
+    await address_is('#/runs/1');
     await page.goBack();
-    assert.equal(await hash(), zoomed);
+    await address_is(zoomed);
     await page.click('#time-clock');
-    assert.match(await text('#plot-window'), /^\d\d:\d\d:\d\d\.\d to/);
+    await shows(page, '#plot-window', /^\d\d:\d\d:\d\d\.\d to/);
     await page.click('#whole-run');
     await page.locator('.run-strips').focus();
     await page.keyboard.press('+');
@@ -216,8 +213,7 @@ const steps = {
     await until('the robot is latched', async () => (await bench.ask(`/robots/${kRobot}`)).mode === 'emergency');
     assert.equal(await page.inputValue('#said-notes'), 'half a sentence');
     await page.fill('#said-notes', 'the pump was warm');
-    const { emergency_id } = await bench.ask(`/robots/${kRobot}`);
-    await command({ kind: 'clear_emergency', emergency_id });
+    await clear_by_script(bench, kRobot);
   },
 
   async 'its files are downloaded'() {
@@ -234,7 +230,7 @@ const steps = {
   async 'its impedance stands against the position'() {
     await page.click('#open-map');
     await page.locator('.strip.map canvas').waitFor();
-    assert.match(await hash(), /map=5/);
+    await until('it stands in the address', async () => /map=5/.test(await hash()));
     await assert_accessible(page, 'a run');
   },
 
@@ -242,7 +238,7 @@ const steps = {
     await page.setViewportSize({ width: 1440, height: 900 });
     await open('#/runs');
     await page.click('[data-run="1"] input');
-    assert.match(await text('#chosen'), /Choose one more/);
+    await shows(page, '#chosen', /Choose one more/);
     await page.click('[data-run="2"] input');
     await page.click('#compare');
     await until('the traces are there', async () => (await page.locator('.strip.position canvas').count()) === 1);
@@ -250,7 +246,7 @@ const steps = {
     await page.locator('#align-at-list [role=option]', { hasText: 'a step' }).click();
     await until('the address says so', async () => /at=step/.test(await hash()));
     await until('time begins before the step', async () => (await text('#plot-window')).startsWith('−'));
-    assert.ok((await colours('.strip.position')) > 20);
+    await until('the plot has traces', async () => (await colours('.strip.position')) > 20);
     await page.locator('#figures').getByText('Settling time').first().waitFor();
     const compared = await bench.ask('/run-comparison?runs=1,2');
     const settling = compared.steps[0].measures.find(({ name }) => name === 'settling_s');
@@ -344,8 +340,10 @@ const steps = {
   },
 };
 
-await run(bench, steps, async () => {
-  page = await bench.open_browser({ viewport: { width: 1440, height: 900 }, colorScheme: 'dark', acceptDownloads: true });
+const open_pages = async () => {
+  page = await bench.open_page({ viewport: { width: 1440, height: 900 }, colorScheme: 'dark', acceptDownloads: true });
   page.on('pageerror', (error) => faults.push(error.message));
   page.on('console', (message) => /Content.Security.Policy|violates/i.test(message.text()) && faults.push(message.text()));
-});
+};
+
+export const story = { bench, steps, open: open_pages };

@@ -3,7 +3,8 @@ import assert from 'node:assert/strict';
 import { existsSync } from 'node:fs';
 import { createRequire } from 'node:module';
 import { assert_accessible } from './accessible.mjs';
-import { Bench, run, until } from './programs.mjs';
+import { hold as hold_on, shows, sign_in } from './hands.mjs';
+import { Bench, until } from './programs.mjs';
 
 const { encode } = createRequire(new URL('../../web/package.json', import.meta.url))('uqr');
 const kSections = ['health', 'storage', 'backups', 'accounts', 'sessions', 'tokens', 'robots', 'audit', 'log',
@@ -18,6 +19,7 @@ let secret = '';
 
 const text = (selector) => page.locator(selector).first().innerText();
 const address = () => page.evaluate(() => location.hash);
+const address_is = (wanted) => until(`the address is ${wanted}`, async () => (await address()) === wanted);
 const word = (line) => page.locator(`#station-line-${line}`).getAttribute('data-word');
 const is_there = async (selector) => (await page.locator(selector).count()) > 0;
 const open = async (section, is_for_all = true) => {
@@ -28,18 +30,7 @@ const enrolment = async (robot_id) =>
   (await bench.ask('/enrolments')).enrolments.find((each) => each.robot_id === robot_id);
 const entries = async (query) => (await bench.ask(`/audit?${query}`)).entries;
 
-// Holds a button until `done`; a page that stood still for a moment ends a hold, and it is begun again.
-const hold = (selector, what, done) =>
-  until(what, async () => {
-    if (await done()) return true;
-    if (!(await is_there(selector)) || !(await page.locator(selector).isEnabled())) return false;
-    await page.locator(selector).scrollIntoViewIfNeeded();
-    await page.hover(selector);
-    await page.mouse.down();
-    await page.waitForTimeout(1200);
-    await page.mouse.up();
-    return until(what, done, 3000).catch(() => false);
-  });
+const hold = (selector, what, done) => hold_on(page, selector, what, done);
 
 const choose = async (field, option) => {
   await page.click(`#${field}`);
@@ -54,17 +45,17 @@ const steps = {
     await page.click('#open-station');
     await until('all is well', async () => (await page.locator('#station-summary').getAttribute('data-word')) === 'good');
     assert.equal(await page.locator('.station-health-table tbody tr').count(), 16);
-    assert.match(await text('#station-line-robots .value'), /^2 of 2 connected$/);
-    assert.match(await text('#station-line-stop .value'), /^open to all 2 connected$/);
-    assert.match(await text('#station-line-writes .value'), /^\d+ samples\/s, \d+\.\d commits\/s$/);
-    assert.match(await text('#station-line-stops .value'), /^none since the start$/);
+    await shows(page, '#station-line-robots .value', /^2 of 2 connected$/);
+    await shows(page, '#station-line-stop .value', /^open to all 2 connected$/);
+    await shows(page, '#station-line-writes .value', /^\d+ samples\/s, \d+\.\d commits\/s$/);
+    await shows(page, '#station-line-stops .value', /^none since the start$/);
   },
 
   async 'each section has an address, and "back" leads back; an address of nothing says so'() {
     for (const section of kSections) {
       await open(section);
-      assert.equal(await address(), `#/station/${section}`);
-      assert.equal(await page.locator('.station-sections [aria-current=page]').getAttribute('id'), `station-open-${section}`);
+      await address_is(`#/station/${section}`);
+      await page.locator(`.station-sections #station-open-${section}[aria-current=page]`).waitFor();
     }
     await page.goBack();
     await page.locator('#station-configuration').waitFor();
@@ -92,7 +83,7 @@ const steps = {
     assert.equal(await text('#station-new-password'), 'correct horse battery');
     await page.locator('#station-user-added button', { hasText: 'Done' }).click();
     const row = page.locator('tr[data-user=vera]');
-    assert.equal(await row.locator('.role').innerText(), 'operator');
+    await until('it has its role', async () => (await row.locator('.role').innerText()) === 'operator');
     await row.locator('button').click();
     await choose('station-edit-role', 'viewer');
     await page.click('#station-save-user');
@@ -116,7 +107,7 @@ const steps = {
     await other.locator('#emergency-stop').waitFor();
     await other.context().close();
     await page.locator('#station-link button', { hasText: 'Done' }).click();
-    assert.ok(!(await page.content()).includes(url));
+    await until('it is gone', async () => !(await page.content()).includes(url));
   },
 
   async 'a token: made, shown once, works, is revoked and works no longer'() {
@@ -133,7 +124,7 @@ const steps = {
       (await fetch(`${bench.http}/api/v1/station`, { headers: { Authorization: `Bearer ${token}` } })).status;
     assert.equal(await status(), 200);
     await page.click('#station-token-done');
-    assert.ok(!(await page.content()).includes(token), 'it is not shown again');
+    await until('it is not shown again', async () => !(await page.content()).includes(token));
     assert.match(await page.locator('tr[data-token=logger]').innerText(), /read, ?record/);
     await hold('#station-revoke-logger', 'it is revoked', () => is_there('#station-token-revoked tr[data-token=logger]'));
     assert.equal(await status(), 401);
@@ -155,7 +146,7 @@ const steps = {
 
   async 'a robot is enrolled: token, QR code and lines, and it connects with that token'() {
     await open('robots');
-    assert.deepEqual(await page.locator('tr[data-robot]').evaluateAll((all) => all.map((each) => each.dataset.robot)), ['sim-1', 'sim-2']);
+    await until('both are listed', async () => (await page.locator('tr[data-robot]').evaluateAll((all) => all.map((each) => each.dataset.robot))).join() === 'sim-1,sim-2');
     await page.fill('#station-robot-name', 'Rheo 1');
     await page.click('#station-enrol');
     assert.match(await text('#station-enrol-problem'), /^robot = “Rheo 1” is not 1 to 31 characters/);
@@ -168,7 +159,7 @@ const steps = {
     const said = await text('#station-robot-text');
     assert.equal(said, `rheonaut-robot:1?id=${kNew}&token=${secret}&station=${bench.endpoints.robots}`);
     assert.ok((await text('#station-sim-line')).endsWith(`--id ${kNew} --token ${secret}`));
-    assert.deepEqual(await drawn_modules('#station-robot-code'), encode(said, { ecc: 'M', border: 0 }).data);
+    await until('the code is of that text', async () => JSON.stringify(await drawn_modules('#station-robot-code')) === JSON.stringify(encode(said, { ecc: 'M', border: 0 }).data));
     bench.start_robot(kNew, '--token', secret);
     await until('the page sees it connected', async () => /connected$/.test(await text('#station-enrolled-link')));
   },
@@ -177,15 +168,15 @@ const steps = {
     await page.fill('#station-robot-address', 'lab');
     await page.getByText('station = “lab” is not ADDRESS:PORT').waitFor();
     await page.fill('#station-robot-address', '192.168.1.20:7070');
-    const said = await text('#station-robot-text');
-    assert.match(said, /&station=192\.168\.1\.20:7070$/);
-    assert.deepEqual(await drawn_modules('#station-robot-code'), encode(said, { ecc: 'M', border: 0 }).data);
+    await shows(page, '#station-robot-text', /&station=192\.168\.1\.20:7070$/);
+    const code = encode(await text('#station-robot-text'), { ecc: 'M', border: 0 }).data;
+    await until('the code is of that text', async () => JSON.stringify(await drawn_modules('#station-robot-code')) === JSON.stringify(code));
     await page.evaluate(() => Object.defineProperty(navigator, 'clipboard', { value: undefined, configurable: true }));
     await page.click('#copy-station-robot-secret');
     await page.getByText('Selected: press Ctrl C').waitFor();
-    assert.equal(await page.evaluate(() => String(getSelection())), secret);
+    await until('the token is selected', async () => (await page.evaluate(() => String(getSelection()))) === secret);
     await page.click('#station-enrolled-done');
-    assert.ok(!(await page.content()).includes(secret), 'it is not shown again');
+    await until('it is not shown again', async () => !(await page.content()).includes(secret));
   },
 
   async 'Escape stops while a name is typed here'() {
@@ -201,7 +192,7 @@ const steps = {
     await open('robots');
     const state = () => page.locator(`tr[data-robot=${kNew}] .state`).innerText();
     await hold(`#station-retire-${kNew}`, 'it is retired', async () => /^retired /.test(await state()));
-    assert.notEqual((await enrolment(kNew)).retired_at_us, null);
+    await until('the station has it', async () => (await enrolment(kNew)).retired_at_us !== null);
     await hold(`#station-retire-${kNew}`, 'it is put back', async () => (await state()) === 'in use');
     await hold(`#station-retire-${kNew}`, 'it is retired again', async () => /^retired /.test(await state()));
     await hold(`#station-revoke-${kNew}`, 'it is revoked', async () => /^revoked /.test(await state()));
@@ -234,21 +225,21 @@ const steps = {
   async 'the audit has all of it, newest first; filters stand in the address'() {
     await open('audit');
     await page.locator('tr[data-entry]').first().waitFor();
-    const actions = await page.locator('tr[data-entry]').evaluateAll((all) => all.map((each) => each.dataset.action));
+    const actions = () => page.locator('tr[data-entry]').evaluateAll((all) => all.map((each) => each.dataset.action));
     for (const action of ['account.user_added', 'account.user_changed', 'account.link_made', 'account.token_made', 'account.token_revoked',
                           'account.session_ended', 'robot.enrolled', 'robot.retired', 'robot.unretired', 'robot.revoked'])
-      assert.ok(actions.includes(action), `${action} in ${actions.join(' ')}`);
+      await until(`${action} is listed`, async () => (await actions()).includes(action));
     const numbers = await page.locator('tr[data-entry]').evaluateAll((all) => all.map((each) => Number(each.dataset.entry)));
     assert.deepEqual(numbers, [...numbers].sort((a, b) => b - a));
     await choose('station-audit-action', 'robot');
-    assert.equal(await address(), '#/station/audit?action=robot');
+    await address_is('#/station/audit?action=robot');
     await until('only those', async () => (await page.locator('tr[data-entry]:not([data-action^="robot."])').count()) === 0);
     await page.locator('tr[data-action="robot.retired"] .station-link', { hasText: kNew }).first().click();
-    assert.equal(await address(), `#/station/audit?action=robot&robot=${kNew}`);
+    await address_is(`#/station/audit?action=robot&robot=${kNew}`);
     await page.fill('#station-audit-actor', 'user:nobody');
     await page.getByText('No entry is like that').waitFor();
     await page.click('#station-audit-all');
-    assert.equal(await address(), '#/station/audit');
+    await address_is('#/station/audit');
     await page.locator('tr[data-action="account.user_added"] .number .station-link').click();
     const [added] = await entries('action=account.user_added');
     await page.getByText(added.hash).waitFor();
@@ -261,10 +252,10 @@ const steps = {
     for (let at = 0; at < 110; ++at) await bench.post('/robots/sim-2/commands', { kind: 'ping' });
     await page.reload();
     await page.locator('#station-audit-older').waitFor();
-    assert.equal(await page.locator('tr[data-entry]').count(), 100);
+    await until('a page of them is there', async () => (await page.locator('tr[data-entry]').count()) === 100);
     await page.click('#station-audit-older');
     await until('all are there', async () => (await page.locator('tr[data-entry]').last().getAttribute('data-entry')) === '1');
-    assert.equal(await is_there('#station-audit-older'), false);
+    await page.locator('#station-audit-older').waitFor({ state: 'detached' });
   },
 
   async 'times are local or UTC by one switch, and exact when pointed at'() {
@@ -272,7 +263,7 @@ const steps = {
     const [first] = (await entries('limit=1000')).slice(-1);
     const utc = new Date(first.at_us / 1000).toISOString().slice(0, 19).replace('T', ' ');
     if ((await text('#station-clock')) === 'Local time') await page.click('#station-clock');
-    assert.equal(await shown(), utc);
+    await until('UTC is shown', async () => (await shown()) === utc);
     assert.ok((await page.locator('tr[data-entry="1"] time').getAttribute('title')).startsWith(utc));
     await page.click('#station-clock');
   },
@@ -282,9 +273,9 @@ const steps = {
     await until('the recording is good', async () => (await word('recording')) === 'good');
     bench.station.process.kill('SIGSTOP');
     await until('no line is good', async () => (await page.locator('.station-health-table tr.good').count()) === 0);
-    assert.equal(await word('recording'), 'unknown');
-    assert.match(await text('#station-line-recording .value'), /everything is recorded/);
-    assert.equal(await page.locator('#station-line-recording .value').evaluate((cell) => getComputedStyle(cell).fontStyle), 'italic');
+    await until('what it was is not known now', async () => (await word('recording')) === 'unknown');
+    await shows(page, '#station-line-recording .value', /everything is recorded/);
+    await until('its value is marked', () => page.locator('#station-line-recording .value').evaluate((cell) => getComputedStyle(cell).fontStyle === 'italic'));
     bench.station.process.kill('SIGCONT');
     await until('it is good again', async () => (await word('recording')) === 'good');
   },
@@ -293,10 +284,7 @@ const steps = {
     const admin = page;
     page = await bench.open_page();
     page.on('pageerror', (error) => faults.push(error.message));
-    await page.goto(bench.http);
-    await page.fill('#user', 'vera');
-    await page.fill('#password', 'another horse battery');
-    await page.press('#password', 'Enter');
+    await sign_in(page, bench.http, 'vera', 'another horse battery', page.locator('#open-station'));
     await page.click('#open-station');
     await until('health is judged', async () => (await word('recording')) === 'good');
     for (const section of kForAdmins) {
@@ -359,8 +347,10 @@ async function drawn_modules(selector) {
   return modules;
 }
 
-await run(bench, steps, async () => {
-  page = await bench.open_browser({ viewport: { width: 1440, height: 900 }, acceptDownloads: true });
+const open_pages = async () => {
+  page = await bench.open_page({ viewport: { width: 1440, height: 900 }, acceptDownloads: true });
   page.on('pageerror', (error) => faults.push(error.message));
   page.on('console', (message) => message.type() === 'error' && !/status of \d{3}|net::ERR/.test(message.text()) && faults.push(message.text()));
-});
+};
+
+export const story = { bench, steps, open: open_pages };

@@ -1,11 +1,12 @@
 // What the plots of a robot can show beside recorded traces: what was predicted of an experiment, traces computed from
 // others, one channel against another; and the sound of thresholds.
 //
-//   traces_test.mjs [--pictures FOLDER]
+//   stories.mjs [--pictures FOLDER] traces
 import assert from 'node:assert/strict';
 import { join } from 'node:path';
 import { assert_accessible } from './accessible.mjs';
-import { Bench, run, until } from './programs.mjs';
+import { drawn as frames, live as is_fresh, samples, shows } from './hands.mjs';
+import { Bench, until } from './programs.mjs';
 
 const kRobot = 'rheo-1';
 const kProfile = `name = "A step"
@@ -27,9 +28,8 @@ const faults = [];
 let page;
 
 const text = (selector) => page.locator(selector).first().innerText();
-const robot = () => bench.ask(`/robots/${kRobot}`);
 const picture = async (name) => pictures && page.screenshot({ path: join(pictures, `${name}.png`) });
-const live = () => until('samples arrive', async () => (await page.locator('.readouts.stale').count()) === 0);
+const live = () => is_fresh(page);
 const choose = async (field, option) => {
   await page.click(field);
   await page.locator(`${field}-list [role=option]`, { hasText: option }).first().click();
@@ -61,7 +61,7 @@ const steps = {
     bench.start_robot(kRobot);
     await page.locator('.annunciator h1').getByText(kRobot).waitFor();
     await live();
-    await page.waitForTimeout(600);
+    await samples(bench, kRobot, 100);
     assert.equal(await page.locator('.of-position .swatch.predicted').count(), 0);
   },
 
@@ -101,7 +101,10 @@ const steps = {
         return said && Math.abs(Number(said.replace('−', '-')) - millimetres) < 1.5;
       });
     }
-    assert.ok(!/predicted/.test(await value_at(0.05)), 'before its beginning nothing is predicted');
+    await until('before its beginning nothing is predicted', async () => {
+      const said = await value_at(0.05);
+      return /\d/.test(said) && !/predicted/.test(said);
+    });
     await picture('predicted');
   },
 
@@ -143,7 +146,7 @@ const steps = {
   async 'they are kept, also for what the station has recorded, and can be removed'() {
     await page.reload();
     await live();
-    assert.equal(await page.locator('.of-derived').count(), 3);
+    await until('all three are there', async () => (await page.locator('.of-derived').count()) === 3);
     const strip = /strip-\d+/.exec(await page.locator('.strip', { hasText: 'low-pass position_m' }).getAttribute('class'))[0];
     await until('there is one of the past', async () => /^−?\d+\.\d mm$/.test(await value_at(0.93, `.${strip}`)));
     await page.click('#plots-traces');
@@ -166,7 +169,7 @@ const steps = {
     await picture('xy');
     await page.reload();
     await page.locator('#xy-plot').waitFor();
-    assert.match(await text('#xy-y'), /velocity_m_s/);
+    await shows(page, '#xy-y', /velocity_m_s/);
     await assert_accessible(page, 'plots with X–Y', [[1440, 900], [390, 844]]);
     await page.setViewportSize({ width: 1440, height: 900 });
     await page.click('#plots-xy');
@@ -189,7 +192,8 @@ const steps = {
     await page.click('#plots-thresholds');
     await threshold('10');
     await page.locator('#alert-line').waitFor();
-    await page.waitForTimeout(300);
+    await samples(bench, kRobot, 50);
+    await frames(page);
     assert.equal(await tones(), 0, 'sounds are off');
     assert.equal(await page.locator('#mute-alerts').count(), 0);
     await page.click('#acknowledge-alerts');
@@ -201,13 +205,14 @@ const steps = {
     await threshold('10');
     await until('the threshold sounds', async () => (await tones()) === 5);
     await page.click('#mute-alerts');
-    assert.equal(await text('#mute-alerts'), 'Muted');
-    assert.equal(await page.isChecked('#threshold-sound'), false);
+    await shows(page, '#mute-alerts', 'Muted');
+    await page.locator('#threshold-sound:not(:checked)').waitFor();
     await page.click('#acknowledge-alerts');
     await threshold('');
     await threshold('11');
     await page.locator('#alert-line').waitFor();
-    await page.waitForTimeout(400);
+    await samples(bench, kRobot, 50);
+    await frames(page);
     assert.equal(await tones(), 5, 'muted');
     await picture('threshold');
     await threshold('');
@@ -215,8 +220,10 @@ const steps = {
   },
 };
 
-await run(bench, steps, async () => {
-  page = await bench.open_browser({ viewport: { width: 1440, height: 900 }, colorScheme: 'dark' });
+const open_pages = async () => {
+  page = await bench.open_page({ viewport: { width: 1440, height: 900 }, colorScheme: 'dark' });
   page.on('pageerror', (error) => faults.push(error.message));
   page.on('console', (message) => /Content.Security.Policy|violates/i.test(message.text()) && faults.push(message.text()));
-});
+};
+
+export const story = { bench, steps, open: open_pages };

@@ -1,7 +1,8 @@
 // What the page shows is true: where a robot is that a disturbance moves, what is known while the station is silent, a
 // run that was interrupted, an emergency in a tab that nobody looks at, and plots that never cover a control.
 import assert from 'node:assert/strict';
-import { Bench, clear_latch, run, until } from './programs.mjs';
+import { clear_latch, drawn, live as fresh, samples, seen_mode, shows, take_control } from './hands.mjs';
+import { Bench, until } from './programs.mjs';
 
 const kRobot = 'rheo-1';
 const bench = new Bench();
@@ -9,12 +10,11 @@ let page;
 
 const text = (selector) => page.locator(selector).first().innerText();
 const number = async (name) => Number((await text(`#numeral-${name} output`)).replace('\u2212', '-'));
-const mode = () => page.locator('.annunciator').getAttribute('data-mode');
 const robot = () => bench.ask(`/robots/${kRobot}`);
 const command = (body) => bench.post(`/robots/${kRobot}/commands`, body);
 const live = async () => {
   await page.locator('.top-bar .lamp.good').waitFor();
-  await until('samples arrive', async () => (await page.locator('.readouts.stale').count()) === 0);
+  await fresh(page);
 };
 const phase = () => page.locator('#stop-line').getAttribute('data-phase');
 
@@ -32,7 +32,7 @@ const steps = {
     await live();
     assert.equal((await command({ kind: 'set_mode', mode: 'auto', setpoint_m: 0.1 })).status, 200);
     await until('the robot is at 100 mm', async () => Math.abs((await number('position')) - 100) < 2);
-    assert.equal(await text('#disturbance'), 'disturbance 0.0 mm');
+    await shows(page, '#disturbance', 'disturbance 0.0 mm');
     const both = await page.evaluate(() => ['seen', 'position'].map((name) => document.querySelector(`#numeral-${name} output`).textContent));
     assert.equal(both[0], both[1], 'without a disturbance it sees where it is');
     assert.equal((await command({ kind: 'inject_disturbance', disturbance_m: -0.05 })).status, 200);
@@ -42,8 +42,8 @@ const steps = {
     });
     await until('the page shows it there', async () => Math.abs((await number('position')) - 150) < 2);
     await until('and at 100 mm for its controller', async () => Math.abs((await number('seen')) - 100) < 2);
-    assert.equal(await number('setpoint'), 100);
-    assert.equal(await text('#disturbance'), 'disturbance \u221250.0 mm');
+    await until('with the setpoint', async () => (await number('setpoint')) === 100);
+    await shows(page, '#disturbance', 'disturbance \u221250.0 mm');
     await until('off by what is true', async () => /off by (4[89]|5[01])\.\d/.test(await text('#numeral-position .foot')));
     await until('off by nearly nothing', async () => /off by \u2212?[01]\.\d/.test(await text('#numeral-seen .foot')));
   },
@@ -51,10 +51,9 @@ const steps = {
   async 'wherever a position is shown it carries its ±'() {
     const { position_sd_m } = await robot();
     assert.ok(position_sd_m > 0);
-    const spread = /± \d+\.\d/;
-    assert.match(await text('#numeral-position .foot'), /± \d+\.\d mm \(2 sd\), off by .*\smodel assumed/);
-    assert.match(await text('#numeral-seen .foot'), spread);
-    assert.match(await text('.robot-entry .figure'), /^1[45]\d\.\d ± \d+\.\d mm$/);
+    await shows(page, '#numeral-position .foot', /± \d+\.\d mm \(2 sd\), off by .*\smodel assumed/);
+    await shows(page, '#numeral-seen .foot', /± \d+\.\d/);
+    await shows(page, '.robot-entry .figure', /^1[45]\d\.\d ± \d+\.\d mm$/);
     await until('what it shows is two standard deviations', async () => {
       const shown_mm = Number(/± (\d+\.\d)/.exec(await text('#numeral-position .foot'))[1]);
       return Math.abs(shown_mm - 2000 * (await robot()).position_sd_m) < 0.3; // both change with time
@@ -62,18 +61,15 @@ const steps = {
     for (const line of await page.locator('.log-strip .text').allInnerTexts()) {
       if (/ at .* mm/.test(line)) assert.match(line, /± (\d+\.\d mm|not known)/, line); // of an event that no samples surround
     }
-    const disturbed_seq = (await robot()).next_seq;
-    await until('two seconds with the disturbance', async () => (await robot()).next_seq > disturbed_seq + 200);
+    await samples(bench, kRobot, 200); // with the disturbance
     const plot = await page.locator('.strip-0 .plot').boundingBox();
     await page.mouse.move(plot.x + plot.width - 30, plot.y + plot.height / 2);
-    await until('the cursor says a position', async () => /mm at/.test(await text('.strip-0 .cursor')));
-    assert.match(await text('.strip-0 .cursor'), /^1\d\d\.\d ± \d+\.\d, seen \d+\.\d, mm at/);
+    await shows(page, '.strip-0 .cursor', /^1\d\d\.\d ± \d+\.\d, seen \d+\.\d, mm at/);
     await page.mouse.move(5, 5);
   },
 
   async 'nothing claims control or a recording while the page is cut off'() {
-    await page.click('#take-control');
-    await until('the page is in control', async () => (await text('#control-line')).includes('You are in control'));
+    await take_control(page, async () => (await text('#control-line')).includes('You are in control'));
     await start_run('cut off');
     await page.locator('.recording-lamp').waitFor();
     bench.station.process.kill('SIGSTOP');
@@ -102,7 +98,7 @@ const steps = {
     bench.station.process.kill('SIGCONT');
     // By telemetry, or by the answer of the press, which the page sends again.
     await until('the page sees the latch', async () => ['seen', 'stopped'].includes(await phase()));
-    assert.equal(await mode(), 'emergency');
+    await seen_mode(page, 'emergency'); // after the answer telemetry shows it
     await until('its motor is off', async () => (await robot()).sample.duty === 0);
     await live();
     await page.locator('.recording-lamp').waitFor(); // the run is open still
@@ -120,7 +116,7 @@ const steps = {
     await notice.waitFor();
     assert.match(await notice.innerText(), /Run “doomed” was interrupted at \d\d:\d\d:\d\d/);
     await until('the log says it', async () => (await text('.log-strip ol')).includes('“doomed”'));
-    assert.equal(await page.locator('.recording-lamp').count(), 0);
+    await page.locator('.recording-lamp').waitFor({ state: 'detached' });
     await page.reload();
     await live();
     await notice.waitFor();
@@ -130,6 +126,7 @@ const steps = {
     await live();
     await page.locator('#start-run').waitFor();
     await until('the newest run was asked for', () => page.evaluate(() => performance.getEntriesByType('resource').some((each) => each.name.includes('limit=1'))));
+    await drawn(page);
     assert.equal(await notice.count(), 0, 'it stays dismissed');
   },
 
@@ -148,13 +145,13 @@ const steps = {
 
   async 'an emergency in a tab in the background shows in its title and icon'() {
     const tab = () => page.evaluate(() => ({ title: document.title, icon: document.querySelector('link[rel=icon]').getAttribute('href') }));
-    assert.deepEqual(await tab(), { title: 'Rheonaut', icon: '/favicon.svg' });
+    await until('neither says anything yet', async () => (await tab()).title === 'Rheonaut' && (await tab()).icon === '/favicon.svg');
     const other = await page.context().newPage();
     await other.bringToFront();
     await bench.post(`/robots/${kRobot}/emergency-stop`, undefined);
     await until('the title says it', async () => (await tab()).title === `EMERGENCY ${kRobot} · Rheonaut`);
-    const { icon } = await tab();
-    assert.equal(icon, '/favicon_emergency.svg');
+    const icon = '/favicon_emergency.svg';
+    await until('and the icon', async () => (await tab()).icon === icon);
     const answer = await fetch(bench.http + icon);
     assert.equal(answer.status, 200);
     assert.match(answer.headers.get('content-type'), /svg/);
@@ -200,6 +197,8 @@ function covered() {
   return faults;
 }
 
-await run(bench, steps, async () => {
-  page = await bench.open_browser({ viewport: { width: 1440, height: 900 }, colorScheme: 'dark' });
-});
+const open_pages = async () => {
+  page = await bench.open_page({ viewport: { width: 1440, height: 900 }, colorScheme: 'dark' });
+};
+
+export const story = { bench, steps, open: open_pages };

@@ -6,18 +6,18 @@
 import assert from 'node:assert/strict';
 import { request as ask_http, createServer } from 'node:http';
 import { connect } from 'node:net';
-import { Bench, run, until } from './programs.mjs';
+import { clear_by_script, drawn, hold_by_mouse, live as is_fresh, samples, shows } from './hands.mjs';
+import { Bench, until } from './programs.mjs';
 
 const kRobot = 'sim-1';
 const bench = new Bench();
 const faults = [];
 let page, front, front_url;
 
-const text = (selector) => page.locator(selector).first().innerText();
 const robot = () => bench.ask(`/robots/${kRobot}`);
 const live = async () => {
   await page.locator('.top-bar .lamp.good').waitFor();
-  await until('samples arrive', async () => (await page.locator('.readouts.stale').count()) === 0);
+  await is_fresh(page);
 };
 
 // ---- the network in front of the station
@@ -83,12 +83,9 @@ async function upgrade(to) {
 // One press is one stop of the robot; then the latch is taken away again.
 async function escape_stops(what) {
   await page.keyboard.press('Escape');
-  const { emergency_id } = await until(`Escape stops: ${what}`, async () => {
-    const now = await robot();
-    return now.emergency_id !== null && now;
-  });
+  await until(`Escape stops: ${what}`, async () => (await robot()).emergency_id !== null);
   await page.locator('#latch').waitFor();
-  assert.equal((await bench.post(`/robots/${kRobot}/commands`, { kind: 'clear_emergency', emergency_id })).status, 200);
+  await clear_by_script(bench, kRobot);
   await bench.post(`/robots/${kRobot}/control`, { action: 'release' });
   await page.locator('#latch').waitFor({ state: 'detached' });
 }
@@ -105,6 +102,8 @@ const steps = {
     await upgrade('');
     await until('it has looked again', () => looks > before);
     await live();
+    await samples(bench, kRobot, 100);
+    await drawn(page);
     assert.equal(await page.locator('#outdated').count(), 0);
   },
 
@@ -113,7 +112,7 @@ const steps = {
     await page.evaluate(() => (window.loaded_once = true));
     await upgrade('second/');
     await page.locator('#outdated').waitFor();
-    assert.match(await text('#outdated'), /The station has a newer version of this page/);
+    await shows(page, '#outdated', /The station has a newer version of this page/);
     await live();
     assert.equal(await page.inputValue('#run-name'), 'half a name');
     assert.ok(await page.evaluate(() => window.loaded_once), 'it was not loaded anew by itself');
@@ -121,29 +120,20 @@ const steps = {
   },
 
   async 'it drives, and does not load itself anew under the hand that holds a duty'() {
-    const hold = page.locator('#hold-to-run');
-    await until('the duty runs', async () => {
-      await hold.hover();
-      await page.mouse.down();
-      const runs = await until('it runs', async () => (await robot()).sample.duty > 0.1, 5000).catch(() => false);
-      if (!runs) await page.mouse.up(); // the page stood still, and its lease has lapsed
-      return runs;
-    });
+    await hold_by_mouse(page, async () => (await robot()).sample.duty > 0.1);
     await upgrade('third/');
     await until('the motor is off', async () => (await robot()).sample?.duty === 0);
     await page.locator('#outdated').waitFor();
     await live();
     assert.ok(await page.evaluate(() => window.loaded_once));
-    assert.equal((await robot()).sample.duty, 0, 'what is still held moves nothing with another station');
+    await samples(bench, kRobot, 100, ({ sample }) => assert.equal(sample.duty, 0, 'what is still held moves nothing with another station'));
     await page.mouse.up();
   },
 
   async 'a view that was never opened is gone, the page says so, and the stop works there'() {
     await page.click('#open-station');
-    const gone = page.locator('#not-loaded');
-    await gone.waitFor();
-    assert.match(await gone.innerText(), /The station has a newer version of this page, and this view is gone/);
-    assert.equal(await page.locator('.views [aria-current=page]').getAttribute('id'), 'open-station');
+    await shows(page, '#not-loaded', /The station has a newer version of this page, and this view is gone/);
+    await page.locator('.views #open-station[aria-current=page]').waitFor();
     await page.focus('#load-again');
     await escape_stops('in a view that is gone');
     await page.click('#open-robot');
@@ -172,7 +162,9 @@ const steps = {
   },
 };
 
-await run(bench, steps, async () => {
-  page = await bench.open_browser({ viewport: { width: 1440, height: 900 }, colorScheme: 'dark' });
+const open_pages = async () => {
+  page = await bench.open_page({ viewport: { width: 1440, height: 900 }, colorScheme: 'dark' });
   page.on('pageerror', (error) => faults.push(error.message));
-});
+};
+
+export const story = { bench, steps, open: open_pages };
