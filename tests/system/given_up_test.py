@@ -7,10 +7,8 @@ import sqlite3
 import threading
 import unittest
 
-from processes import ApiError, lab, wait_until
+from processes import PATIENCE_S, ApiError, lab, wait_until
 from recording_audit import audit
-
-PATIENCE_S = 60
 
 
 class Relay:

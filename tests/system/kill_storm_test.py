@@ -117,7 +117,7 @@ class KillStormTest(unittest.TestCase):
                 there = [robot["robot_id"] for robot in station.robots()
                          if robot["link"] == "connected" and robot["robot_id"].startswith("sim-")]
                 return there and station.post("/api/v1/runs", {"robot_id": there[pick % len(there)], "name": "storm"})
-        wait_until(has_begun, 30, "a run of a robot that is there")
+        wait_until(has_begun, 60, "a run of a robot that is there")
         self.runs_begun += 1
 
     def check(self, place, summary, causes=("ring_overrun",)):
@@ -129,7 +129,7 @@ class KillStormTest(unittest.TestCase):
                 station.post(f"/api/v1/runs/{run['run_id']}/end")
         wait_until(lambda: all(station.get(f"/api/v1/runs/{run['run_id']}/certificate")["final"] for run in runs), 120,
                    "the certificates")
-        self.assertEqual(place.stop_station(timeout_s=60), 0, place.log("station"))
+        self.assertEqual(place.stop_station(), 0, place.log("station"))
         verified = subprocess.run([BIN / "rheonaut", "verify", "--data", place.data, "--json"], capture_output=True,
                                   text=True)
         self.assertEqual(verified.returncode, 0, verified.stdout + verified.stderr)
@@ -170,16 +170,16 @@ class KillStormTest(unittest.TestCase):
             for _ in range(KILLS):
                 self.begin_run(place)
                 self.wait()
-                wait_until((place.data / "rheonaut.reserve").exists, 30, "room that is held for the next start")
+                wait_until((place.data / "rheonaut.reserve").exists, 60, "room that is held for the next start")
                 fill(filler)
                 self.wait()
                 place.kill_station()
                 fill(filler)  # what the station gave back when it died
                 place.start_unannounced(ports["http"], ports["robots"])
                 station = Station(place.data, endpoints=ports)
-                wait_until(lambda: stops_the_swimmer(station), 30, "a robot that is stopped on a full disk")
+                wait_until(lambda: stops_the_swimmer(station), 60, "a robot that is stopped on a full disk")
                 filler.unlink()
-                wait_until(lambda: station.get("/api/v1/recording")["state"] != "failing", 30, "recording again")
+                wait_until(lambda: station.get("/api/v1/recording")["state"] != "failing", 60, "recording again")
             time.sleep(SETTLE_S)
             self.check(place, self.robots.end())
 

@@ -1,14 +1,14 @@
 """A camera beside a run: the simulator's true position, on a clock that nobody knows, is imported by correlation; then the
-measures of the run are those of the truth, and identification fits it. Real processes, half a minute of real time."""
+measures of the run are those of the truth, and identification fits it. Real processes."""
 import random
 import re
 import time
 import unittest
 
-from processes import lab
+from processes import commanded, lab
 
 CLOCK_S, ZERO_M, SD_M = 417.25, -0.8, 0.0005  # what the camera calls 0, on both axes; how exact it is
-STEPS = [(0.1, 8), (0.25, 6), (0.05, 8)]  # setpoint and seconds
+STEPS = [(0.1, 2.5), (0.05, 1.5)]  # setpoint and seconds
 
 
 def read_truth(path):
@@ -23,14 +23,14 @@ class ReferenceTest(unittest.TestCase):
         place.start_robot(station, "sim-1", "--seed", "11", "--truth", truth)
         station.wait_for_robot("sim-1")
         run = station.post("/api/v1/runs", {"robot_id": "sim-1", "name": "steps", "fluid": "non_newtonian"})
-        time.sleep(1)
-        station.command("sim-1", "set_mode", mode="auto", setpoint_m=STEPS[0][0])
+        time.sleep(0.3)  # these times are the input of this test
+        commanded(station, "set_mode", mode="auto", setpoint_m=STEPS[0][0])
         time.sleep(STEPS[0][1])
         for setpoint_m, seconds in STEPS[1:]:
-            station.command("sim-1", "set_setpoint", setpoint_m=setpoint_m)
+            commanded(station, "set_setpoint", setpoint_m=setpoint_m)
             time.sleep(seconds)
         run = station.post(f"/api/v1/runs/{run['run_id']}/end", {})
-        station.command("sim-1", "set_mode", mode="manual")
+        commanded(station, "set_mode", mode="manual")
         return run, read_truth(truth)
 
     def write_camera(self, path, truth):
@@ -80,7 +80,7 @@ class ReferenceTest(unittest.TestCase):
                 end_us = first_us + round(1e6 * step["at_s"]) + 10_000 * (step["last_seq"] - step["first_seq"])
                 true_end_m = min(truth, key=lambda row: abs(row[0] - end_us))[1] + zero_m
                 self.assertAlmostEqual(step["steady_state_error_m"], setpoint_m - true_end_m, delta=0.001)
-            self.assertGreater(metrics["estimate_error"]["samples"], 500)
+            self.assertGreater(metrics["estimate_error"]["samples"], 100)
             self.assertLess(metrics["estimate_error"]["rms_m"], 0.05)
 
             fitted = self.identify(place, run_id)

@@ -33,7 +33,7 @@ class PageOwner:
 
 class SchedulesTest(unittest.TestCase):
     def setUp(self):
-        self.place = self.enterContext(lab())
+        self.place = self.enterContext(lab(config="[robots]\nlink_timeout_ms = 2500\n"))
         self.station = self.place.start_station()
 
     def start_robot(self, robots=None):
@@ -142,7 +142,7 @@ class SchedulesTest(unittest.TestCase):
         self.assertEqual(sent["effect_at_robot_us"], at_us)
         self.station.post(f"{PATH}/control", {"action": "release"})
         path = f"/api/v1/commands/{sent['command_id']}"
-        wait_until(lambda: self.station.get(path)["state"] == "expired", 20, "the robot has dropped it")
+        wait_until(lambda: self.station.get(path)["state"] == "expired", 60, "the robot has dropped it")
         kinds = [one["kind"] for one in self.station.get(f"{PATH}/commands")["commands"]]
         self.assertEqual(kinds, ["drop_timed", "set_duty"])
 
