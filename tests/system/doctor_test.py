@@ -42,15 +42,13 @@ class DoctorTest(unittest.TestCase):
         cls.ended = {}
         for robot in (False, True):
             station = place.start_station()
-            if robot:
-                place.start_robot(station)
+            if robot and place.start_robot(station):
                 wait_until(lambda: station.get("/api/v1/recording")["counters"]["samples_written"] > 0, 60, "samples")
             place.stop_station()
             cls.ended[robot] = shutil.copytree(place.data, place.folder / f"ended-{robot}")
         place.close()
 
     def stopped(self, robot=False):
-        """The folder of a station that ran, perhaps with a robot, and has ended in order."""
         return lab(data=self.ended[robot])
 
     def expect(self, findings, topic, grade, words):
@@ -139,7 +137,6 @@ class DoctorTest(unittest.TestCase):
                 self.send_response(200)
                 self.send_header("Content-Length", "0")
                 self.end_headers()
-
             def log_message(self, *_):
                 pass
 
@@ -167,7 +164,6 @@ class DoctorTest(unittest.TestCase):
                 self.send_header("Content-Length", str(len(body)))
                 self.end_headers()
                 self.wfile.write(body)
-
             def log_message(self, *_):
                 pass
 
