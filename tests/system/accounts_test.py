@@ -9,7 +9,7 @@ import socket
 import subprocess
 import unittest
 
-from processes import BIN, lab, wait_until
+from processes import BIN, lab, stopped, wait_until
 
 PASSWORD = "correct horse battery"
 
@@ -130,7 +130,7 @@ class AccountsTest(unittest.TestCase):
             self.assertEqual(station.get("/api/v1/me")["actor"], "token:button")
             command = json.loads(station.request("POST", "/api/v1/robots/sim-1/commands", {"kind": "ping"})[2])
             self.assertEqual((command["status"], command["needs"]), (403, "operator"))
-            self.assertEqual(station.post("/api/v1/robots/sim-1/emergency-stop")["state"], "acknowledged")
+            stopped(station)
             self.assertEqual(station.request("POST", "/api/v1/login-links")[0], 403)
             listed = cli(place, "token", "list")[1]
             self.assertIn("button", listed)
@@ -251,7 +251,7 @@ class AccountsTest(unittest.TestCase):
         return shown.decode()
 
     def read_some(self, terminal):
-        self.assertTrue(select.select([terminal], [], [], 30)[0], "the program says nothing")
+        self.assertTrue(select.select([terminal], [], [], 60)[0], "the program says nothing")
         try:
             return os.read(terminal, 4096)
         except OSError:  # its end

@@ -112,7 +112,7 @@ class BadInputTest(unittest.TestCase):
                                f"{self.station.token}\r\nContent-Type: application/json\r\n"
                                f"Content-Length: 10000000\r\n\r\n".encode())
             for _ in range(100):  # a client that listens while it sends, and stops when it is answered
-                readable, writable, _ = select.select([connection], [connection], [], 20)
+                readable, writable, _ = select.select([connection], [connection], [], 60)
                 if readable:
                     break
                 self.assertTrue(writable, "the station neither reads nor answers")

@@ -19,7 +19,11 @@ class JobsTest(unittest.TestCase):
         station = place.start_station()
         place.start_robot(station, "sim-1", "--seed", "3")
         station.wait_for_robot("sim-1")
-        cls.run_id = cls.record(station)
+        for _ in range(10):  # a busy machine makes the robot miss ticks, and a run in short pieces cannot be fitted
+            cls.run_id = cls.record(station)
+            fitted = place.tool("identify", "--run", cls.run_id, "--data", place.data, "--structure", "first_order", "--cut-at-gaps")
+            if fitted.returncode in (0, 4):
+                break
         place.stop_station()
         place.close()
         cls.recorded = place.data
@@ -44,7 +48,7 @@ class JobsTest(unittest.TestCase):
         with lab(data=self.recorded) as place:
             place.start_station()
             request = place.folder / "request.json"
-            request.write_text(json.dumps({"kind": "identify", "run_id": self.run_id, "structure": "second_order"}))
+            request.write_text(json.dumps({"kind": "identify", "run_id": self.run_id, "structure": "first_order", "cut_at_gaps": True}))
             found = place.tool("job", "begin", request, "--wait", "--data", place.data)
             self.assertEqual(found.returncode, 0, found.stderr)
             fit = json.loads(found.stdout)
@@ -67,7 +71,7 @@ class JobsTest(unittest.TestCase):
         with lab(data=self.recorded) as place:
             station = place.start_station()
             for _ in range(JOBS):
-                station.post("/api/v1/jobs", {"kind": "identify", "run_id": self.run_id})
+                station.post("/api/v1/jobs", {"kind": "identify", "run_id": self.run_id, "cut_at_gaps": True})
             wait_until(lambda: any(job["state"] == "running" for job in self.jobs(station)), 60, "a running job")
             place.kill_station()
             station = place.start_station(robots=station.endpoints["robots"])
@@ -80,15 +84,15 @@ class JobsTest(unittest.TestCase):
                 for state, result in database.execute("SELECT state, result FROM job"):
                     self.assertEqual(result is not None, state == "done")
             database.close()
-            station.post("/api/v1/jobs", {"kind": "identify", "run_id": self.run_id, "structure": "first_order"})
+            station.post("/api/v1/jobs", {"kind": "identify", "run_id": self.run_id, "structure": "first_order", "cut_at_gaps": True})
             wait_until(lambda: self.jobs(station)[0]["state"] == "done", 60, "the newest job's end")
             self.assertEqual([job["state"] for job in self.jobs(station)[1:]], states, "none of them has begun again")
 
     def test_a_cancelled_job_has_no_result_and_the_next_one_is_computed(self):
         with lab(data=self.recorded) as place:
             station = place.start_station()
-            for more in ({"time_limit_s": 4}, {}, {"structure": "first_order"}):  # the first keeps the second waiting
-                station.post("/api/v1/jobs", {"kind": "identify", "run_id": self.run_id, **more})
+            for more in ({"time_limit_s": 2}, {}, {"structure": "first_order"}):  # the first keeps the second waiting
+                station.post("/api/v1/jobs", {"kind": "identify", "run_id": self.run_id, "cut_at_gaps": True, **more})
             cancelled = place.tool("job", "cancel", 2, "--data", place.data)
             self.assertEqual(cancelled.returncode, 0, cancelled.stderr)
             wait_until(lambda: self.jobs(station)[0]["state"] == "done", 60, "the newest job's end")

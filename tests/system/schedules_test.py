@@ -78,7 +78,7 @@ class SchedulesTest(unittest.TestCase):
 
     def renew_until_refused(self, owner, renewed_us):
         """Goes on renewing until the station no longer knows the owner; when the last renewal was that it carried out."""
-        ends_s = time.monotonic() + 20
+        ends_s = time.monotonic() + 60
         while True:
             self.assertLess(time.monotonic(), ends_s, "the station still obeys the owner")
             try:
