@@ -119,7 +119,7 @@ def perform(station, robot_id, fluid="non_newtonian", truth=None):
         "notes": "setpoint 0.1 m, position disturbance -0.05 m at 20 s, 40 s (the paper's Figure 7)"})
     run_id = run["run_id"]
     start = station.command(robot_id, "set_mode", mode="auto", setpoint_m=SETPOINT_M)["effect_at_robot_us"]
-    wait_until(lambda: station.robot(robot_id)["mode"] == "auto", 5, "auto in telemetry")
+    wait_until(lambda: station.robot(robot_id)["mode"] == "auto", 30, "auto in telemetry")
     follow(station, robot_id, start, DISTURBANCE_AT_S, truth)
     station.command(robot_id, "inject_disturbance", disturbance_m=DISTURBANCE_M)
     follow(station, robot_id, start, DURATION_S, truth)

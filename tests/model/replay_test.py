@@ -15,7 +15,7 @@ sys.path.append(str(pathlib.Path(__file__).resolve().parents[1] / "system"))
 import check  # noqa: E402
 import recorded  # noqa: E402
 import replay  # noqa: E402
-from processes import commanded, lab, wait_until  # noqa: E402
+from processes import cleared, commanded, lab, stopped, swimming, wait_until  # noqa: E402
 
 
 class ReplayTest(unittest.TestCase):
@@ -32,14 +32,12 @@ class ReplayTest(unittest.TestCase):
         return other
 
     def stop_and_clear(self):
-        stopped = self.station.post("/api/v1/robots/sim-1/emergency-stop")
+        emergency_id = stopped(self.station)["emergency_id"]
         self.until(lambda robot: robot["mode"] == "emergency" and not robot["pending_stop"], "latched")
-        commanded(self.station, "clear_emergency", emergency_id=stopped["emergency_id"])
-        self.until(lambda robot: robot["mode"] == "manual", "cleared")
+        cleared(self.station, emergency_id)
 
     def swim(self, setpoint_m):
-        commanded(self.station, "set_mode", mode="auto", setpoint_m=setpoint_m)
-        self.until(lambda robot: robot["sample"]["duty"] != 0, "the motor runs")
+        swimming(self.station, setpoint_m=setpoint_m)
 
     def record(self, place):
         """Stop, clear, takeover, lapse of a lease, lost link with a pending stop, kill of the station."""
@@ -63,7 +61,7 @@ class ReplayTest(unittest.TestCase):
         finally:
             robot.send_signal(signal.SIGCONT)
         latched = self.until(lambda robot: robot["mode"] == "emergency" and not robot["pending_stop"], "stopped")
-        commanded(self.station, "clear_emergency", emergency_id=latched["emergency_id"])
+        cleared(self.station, latched["emergency_id"])
         self.swim(-0.1)
         self.stop_and_clear()
         self.assertEqual(place.stop_station(), 0)
@@ -73,7 +71,7 @@ class ReplayTest(unittest.TestCase):
         return recorded.is_allowed(self.model, dataclasses.replace(self.trace, **lists))
 
     def test_a_real_record_is_allowed_and_forged_ones_are_not(self):
-        with lab() as place, tempfile.TemporaryDirectory() as folder:
+        with lab(config=None) as place, tempfile.TemporaryDirectory() as folder:
             self.trace = self.record(place)
             self.model = check.Model(folder)
             robot, station = self.trace.robot, self.trace.station

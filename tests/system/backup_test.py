@@ -28,7 +28,7 @@ class BackupTest(unittest.TestCase):
         station.wait_for_robot("sim-1")
         run_id = station.post("/api/v1/runs", {"robot_id": "sim-1", "name": "kept"})["run_id"]
         seen = station.robot("sim-1")["next_seq"]
-        wait_until(lambda: station.robot("sim-1")["next_seq"] > seen + 150, 30, "150 samples")
+        wait_until(lambda: station.robot("sim-1")["next_seq"] > seen + 150, 60, "150 samples")
         station.post(f"/api/v1/runs/{run_id}/end")
         return run_id
 
@@ -62,8 +62,8 @@ class BackupTest(unittest.TestCase):
             self.assertEqual(samples(place.data / "station.sqlite", run_id), recorded)
             restored = place.start_station(http=ports["http"], robots=ports["robots"])
             self.assertNotEqual(restored.get("/api/v1/station")["store_id"], before)
-            seen = restored.wait_for_robot("sim-1", timeout_s=60)["next_seq"]
-            wait_until(lambda: restored.robot("sim-1")["durable_next_seq"] > seen + 50, 30, "the robot goes on")
+            seen = restored.wait_for_robot("sim-1")["next_seq"]
+            wait_until(lambda: restored.robot("sim-1")["durable_next_seq"] > seen + 50, 60, "the robot goes on")
             self.assertEqual(restored.get("/api/v1/recording")["state"], "recording")
 
     def test_a_command_names_the_program_that_holds_the_folder(self):

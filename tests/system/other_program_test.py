@@ -6,11 +6,10 @@ import subprocess
 import sys
 import unittest
 
-from processes import lab, wait_until
+from processes import PATIENCE_S, lab, wait_until
 from recording_audit import audit
 
 LOOK = "import sqlite3, sys; file = sqlite3.connect(sys.argv[1]); print(file.execute('SELECT count(*) FROM sample').fetchone()[0]); file.close()"
-PATIENCE_S = 60
 
 
 class OtherProgramTest(unittest.TestCase):

@@ -1,8 +1,9 @@
-"""A station that is dead for 6 s costs 100 robots no sample: their rings hold 8 s, and they dial again in time.
+"""A station that is dead for some seconds costs 100 robots no sample: their rings hold 8 s, and they dial again in time.
 
-That leaves little time: 6 s without a station, about 1.2 s of samples that were not on disk yet, at most 0.6 s until a
-robot dials again. What the machine adds by its own slowness is measured, and when samples are lost in a round in which
-it was too slow, the round says nothing and is repeated. RHEONAUT_STORM_ROBOTS says how many robots.
+With 6 s that leaves little time: about 1.2 s of samples that were not on disk yet, at most 0.6 s until a robot dials again.
+What the machine adds by its own slowness is measured, and when samples are lost in a round in which it was too slow, the
+round says nothing and is repeated. RHEONAUT_STORM_ROBOTS says how many robots, RHEONAUT_OUTAGE_S how long; CTest has 2 s,
+and 6.7 s in virtual time, at a hundred moments (tests/sim_robot/network_faults_test.cpp).
 """
 import contextlib
 import json
@@ -17,7 +18,7 @@ from processes import BIN, FLEET, Station, lab, wait_until
 from recording_audit import audit
 
 ROBOTS = int(os.environ.get("RHEONAUT_STORM_ROBOTS", 100))
-DEAD_S = 6.0
+DEAD_S = float(os.environ.get("RHEONAUT_OUTAGE_S", 6))
 RING_S = 8.0
 REDIAL_S = 0.6  # the longest pause between two attempts
 WELCOME_S = 0.1  # from there to the first samples that are sent again
@@ -92,7 +93,7 @@ class OutageTest(unittest.TestCase):
         dead_s = time.monotonic() - died_at
         return dead_s, behind_s + died_at - asked_at + dead_s
 
-    def test_six_seconds_without_a_station_cost_no_sample(self):
+    def test_seconds_without_a_station_cost_no_sample(self):
         with lab(config=FLEET) as place:
             started_at = time.monotonic()
             self.ports = place.start_station().endpoints
@@ -114,10 +115,10 @@ class OutageTest(unittest.TestCase):
                     break
                 self.assertTrue(was_slow, f"{lost} samples of {ROBOTS} robots are lost: {needed_s:.2f} s of {RING_S} s")
             else:
-                self.skipTest("this machine is too slow to keep an outage of 6 s within the ring")
+                self.skipTest("this machine is too slow to keep such an outage within the ring")
             summary = self.robots.end()
             self.assertEqual(summary["samples_unsettled"], 0, summary)
-            self.assertEqual(place.stop_station(timeout_s=60), 0, place.log("station"))
+            self.assertEqual(place.stop_station(), 0, place.log("station"))
             faults, stored, lost = audit(place.data / "station.sqlite")
             self.assertEqual(faults[:10], [])
             self.assertEqual(lost, lost_before)

@@ -96,7 +96,7 @@ class OverloadTest(unittest.TestCase):
                            for robot in station.robots())
             wait_until(has_recovered, 60, "all robots, with what they sent on disk")
             summary = robots.end()
-            self.assertEqual(place.stop_station(timeout_s=60), 0, place.log("station"))
+            self.assertEqual(place.stop_station(), 0, place.log("station"))
 
             self.assertGreater(summary["samples_lost"], 0, "the rings overran: it was more than the station could do")
             self.assertEqual(summary["samples_unsettled"], 0, summary)

@@ -10,6 +10,7 @@
 #include <fstream>
 
 #include "control/models/plant_models.hpp"
+#include "sim_robot/lab/experiment.hpp"
 #include "tests/server/cli/tool_test.hpp"
 #include "tests/system/paper_fixture.hpp"
 
@@ -169,11 +170,29 @@ class Section5Test : public PaperTest {
     }
   }
 
+  // Every sample is stored, and by the robot's own estimate the error is within 2 sd of the true one.
+  void expect_estimate_near_truth(const json& experiment, std::initializer_list<TrueStep> steps) {
+    const std::string run = fmt::format("/api/v1/runs/{}", run_of(experiment));
+    const json recorded = get(run);
+    EXPECT_GE(recorded.at("samples_stored"), static_cast<int>(2 * kPhase_s * 100));
+    EXPECT_EQ(recorded.at("samples_stored"), recorded.at("samples_expected"));
+    EXPECT_EQ(recorded.at("samples_lost"), 0);
+    const json measured = get(run + "/step-metrics").at("steps");
+    ASSERT_EQ(measured.size(), steps.size());
+    for (std::size_t i = 0; i < measured.size(); ++i) {
+      EXPECT_EQ(measured[i].at("position_source"), "estimate");
+      const double sd_m = measured[i].at("position_sd_m");
+      EXPECT_GT(sd_m, 0);
+      EXPECT_NEAR(measured[i].at("steady_state_error_m"), std::data(steps)[i].measured.steady_state_error_m, 2 * sd_m);
+    }
+  }
+
   json figure_7() {
     const json experiment = perform("figure_7");
     const TrueStep step = true_step(experiment, 0), disturbance = true_step(experiment, 1);
     expect_bounds(step);
     expect_bounds(disturbance);
+    expect_estimate_near_truth(experiment, {step, disturbance});
     expect_same_by_the_station(experiment, {step, disturbance});
     return experiment;
   }
@@ -273,6 +292,16 @@ class GoldenLoopTest : public PaperTest {
     EXPECT_NEAR(first.steady_state_error_m, 0, 1e-5);
   }
 
+  // The station measures what `rheonaut-sim predict` says of this loop.
+  void expect_as_predicted(const json& experiment) {
+    const sim_robot::ExperimentResult predicted = sim_robot::run_experiment({});
+    const json steps = get(fmt::format("/api/v1/runs/{}/step-metrics", run_of(experiment))).at("steps");
+    ASSERT_EQ(steps.size(), 2U);
+    EXPECT_NEAR(steps[0].at("settling_s"), predicted.step.settling_s.value_or(0), 0.0101);
+    EXPECT_NEAR(steps[0].at("overshoot_percent"), predicted.step.overshoot_percent, 0.05);
+    EXPECT_EQ(steps[0].at("position_sd_m"), 0);
+  }
+
   static constexpr double kSameCoefficients_m = 1e-4;
   static constexpr double kSameCoefficientsInWater_m = 2e-4;  // as in sim_robot/experiment_test, which has the reason
 };
@@ -283,6 +312,7 @@ TEST_F(GoldenLoopTest, WithThePerfectSensor) {
   name_fluid("non_newtonian");
   const json seven = perform("figure_7");
   expect_golden(in_softener, {true_step(seven, 0), true_step(seven, 1)}, kSameCoefficients_m);
+  expect_as_predicted(seven);
   const json first = await_experiment(begin_experiment("figure_8"), "paused");
   expect_golden(in_softener, {true_step(first, 0)}, kSameCoefficients_m);
   move_to("water");

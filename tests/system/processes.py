@@ -3,6 +3,7 @@ import contextlib
 import itertools
 import os
 import pathlib
+import shutil
 import signal
 import subprocess
 import sys
@@ -14,12 +15,27 @@ sys.path.insert(0, str(ROOT / "deploy"))
 sys.path.append(str(ROOT / "tests" / "model"))
 
 import replay  # noqa: E402
-from station_api import ApiError, Station, wait_until  # noqa: E402, F401  (used by the tests)
+import station_api  # noqa: E402
+from station_api import ApiError, wait_until  # noqa: E402, F401  (used by the tests)
 
 BIN = pathlib.Path(os.environ["RHEONAUT_BIN"])  # set by CTest
 TRACES = os.environ.get("RHEONAUT_TRACES")  # a folder for what tests/model/replay.py replays; unset: nothing is kept
 NUMBERS = itertools.count(1)
+PATIENCE_S = 60  # far beyond what any step takes: a wait judges order and outcome, not how fast this machine is
+# A link that outlives a machine that stands still for a few seconds. Tests whose subject is the time-out of the link have
+# the station as it comes: lab(config=None), where it is 1 s.
+PATIENT = "[robots]\nlink_timeout_ms = 5000\nheartbeat_interval_ms = 200\n"
 FLEET = (ROOT / "deploy" / "fleet.toml").read_text()  # a station that lets a whole fleet enrol itself
+
+
+class Station(station_api.Station):
+    """With the patience of a test."""
+
+    def request(self, method, path, body=None, timeout_s=PATIENCE_S):
+        return super().request(method, path, body, timeout_s)
+
+    def wait_for_robot(self, robot_id, timeout_s=PATIENCE_S):
+        return super().wait_for_robot(robot_id, timeout_s)
 
 
 class Lab:
@@ -47,7 +63,7 @@ class Lab:
             (self.data / "endpoints.json").unlink()  # of a station that was killed
         self.start_unannounced(http, robots, config)
         try:
-            return Station(self.data, timeout_s=60)
+            return Station(self.data, timeout_s=PATIENCE_S)
         except TimeoutError:
             print(self.log("station"))
             raise
@@ -64,7 +80,7 @@ class Lab:
 
     def tool(self, *arguments):
         """`rheonaut …`, run to its end."""
-        return subprocess.run([str(self.bin / "rheonaut"), *map(str, arguments)], capture_output=True, text=True, timeout=60)
+        return subprocess.run([str(self.bin / "rheonaut"), *map(str, arguments)], capture_output=True, text=True, timeout=2 * PATIENCE_S)
 
     def start_robot(self, station, robot_id="sim-1", *flags):
         return self._start(robot_id, "rheonaut-sim", "--station", station.endpoints["robots"], "--id", robot_id, *flags)
@@ -73,7 +89,7 @@ class Lab:
         self.station_process.kill()
         self.station_process.wait()
 
-    def stop_station(self, timeout_s=30):
+    def stop_station(self, timeout_s=PATIENCE_S):
         """SIGTERM; returns the exit code."""
         self.station_process.send_signal(signal.SIGTERM)
         return self.station_process.wait(timeout=timeout_s)
@@ -88,7 +104,7 @@ class Lab:
                 process.terminate()
         for process in reversed(self.processes):
             try:
-                process.wait(timeout=30)
+                process.wait(timeout=PATIENCE_S)
             except subprocess.TimeoutExpired:
                 process.kill()
                 process.wait()
@@ -103,7 +119,7 @@ def keep_traces(place):
 
 def commanded(station, kind, robot_id="sim-1", **arguments):
     """The answer to a command. One that a machine which stood still has let expire is given again."""
-    deadline = time.monotonic() + 60
+    deadline = time.monotonic() + PATIENCE_S
     while True:
         try:
             return station.command(robot_id, kind, **arguments)
@@ -112,11 +128,49 @@ def commanded(station, kind, robot_id="sim-1", **arguments):
                 raise
 
 
+def swimming(station, robot_id="sim-1", setpoint_m=0.5):
+    """The robot in auto, once its motor runs. A machine that stood still may have broken its link, which ends auto: then
+    it is sent there again."""
+    def runs():
+        robot = station.robot(robot_id)
+        if robot["mode"] == "auto" and robot["setpoint_m"] == setpoint_m:
+            return abs(robot["sample"]["duty"]) > 0.5 and robot
+        with contextlib.suppress(ApiError):  # it may be without a link just now
+            station.command(robot_id, "set_mode", mode="auto", setpoint_m=setpoint_m)
+        return None
+    return wait_until(runs, PATIENCE_S, f"the motor of {robot_id} runs")
+
+
+def stopped(station, robot_id="sim-1"):
+    """The record of a stop that the robot has confirmed. A machine that stands still may keep it from that in time: then
+    it is stopped again."""
+    def confirmed():
+        record = station.post(f"/api/v1/robots/{robot_id}/emergency-stop")
+        return record["state"] in ("acknowledged", "verified") and record
+    return wait_until(confirmed, PATIENCE_S, f"a stop that {robot_id} confirms")
+
+
+def cleared(station, emergency_id, robot_id="sim-1"):
+    """The robot in manual, once this stop is reset."""
+    try:
+        commanded(station, "clear_emergency", robot_id, emergency_id=emergency_id)
+    except ApiError as error:
+        if error.reason != "other_emergency":  # a clear before it has acted, and its answer came too late
+            raise
+    def in_manual():
+        robot = station.robot(robot_id)
+        return robot["mode"] == "manual" and robot
+    return wait_until(in_manual, PATIENCE_S, f"manual of {robot_id} in telemetry")
+
+
 @contextlib.contextmanager
-def lab(disk=None, config=None):
-    """A Lab in a folder of its own, on the disk that is mounted there. When the test fails, the logs are printed."""
+def lab(disk=None, config=PATIENT, data=None):
+    """A Lab in a folder of its own, on the disk that is mounted there. `config` is TOML; None: no file, as it comes. `data`
+    is a data folder of which it has a copy. When the test fails, the logs are printed."""
     with tempfile.TemporaryDirectory(prefix="rheonaut-", dir=disk) as folder:
         place = Lab(folder, config)
+        if data:
+            shutil.copytree(data, place.data)
         try:
             yield place
         except BaseException:

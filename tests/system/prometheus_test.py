@@ -6,7 +6,7 @@ import subprocess
 import unittest
 import urllib.request
 
-from processes import ROOT, lab, wait_until
+from processes import PATIENT, ROOT, lab, wait_until
 from station_api import trust
 
 RULES = ROOT / "deploy/prometheus/rheonaut.rules.yml"
@@ -48,7 +48,7 @@ class PrometheusTest(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         # One station that speaks TLS and has a robot: it exposes everything.
-        with lab(config='[tls]\nmode = "on"\n') as place:
+        with lab(config=PATIENT + '[tls]\nmode = "on"\n') as place:
             made = place.tool("certificate", "--data", place.data).stdout
             station = place.start_station()
             pin = re.search(r"^pin +([0-9a-f]{64})$", made, re.M).group(1)

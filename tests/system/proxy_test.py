@@ -10,7 +10,7 @@ import unittest
 import urllib.request
 
 PROGRAM = pathlib.Path(os.environ["RHEONAUT_BIN"]) / "rheonaut-sim"
-TIMEOUT_S = 30
+TIMEOUT_S = 60
 
 
 class Running:

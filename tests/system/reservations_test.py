@@ -2,7 +2,7 @@
 import json
 import unittest
 
-from processes import lab
+from processes import lab, stopped
 
 
 class ReservationsTest(unittest.TestCase):
@@ -29,7 +29,7 @@ class ReservationsTest(unittest.TestCase):
             self.assertEqual(station.robot("sim-1")["reservation"]["holder"], "user:anna", "on disk before its answer")
             status, refused = self.post(station, "/api/v1/robots/sim-1/control", {"action": "take"})
             self.assertEqual((status, refused["reason"]), (409, "reserved"))
-            self.assertEqual(self.post(station, "/api/v1/robots/sim-1/emergency-stop")[0], 200)
+            stopped(station)
             listed = place.tool("robot", "reservations", "sim-1", "--data", place.data)
             self.assertIn("user:anna", listed.stdout)
             self.assertIn("bed 3", listed.stdout)

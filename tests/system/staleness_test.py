@@ -5,19 +5,18 @@ import threading
 import time
 import unittest
 
-from processes import lab, wait_until
+from processes import PATIENT, commanded, lab, wait_until
 from proxy_test import Running
 
 SETPOINTS = [round(0.2 + 0.005 * i, 3) for i in range(50)]
 STALL_S = 2
 SPREAD_S = 0.03  # between two setpoints: all of them within 1.5 s, where the machine is not too busy
 MARGIN_S = 0.4  # how long before its end a setpoint must be sent to be sure to arrive within the stall
-PATIENT = "[robots]\nlink_timeout_ms = 5000\nheartbeat_interval_ms = 200\n"  # a stall of 2 s is no lost link
 
 
 class StalenessTest(unittest.TestCase):
     def setUp(self):
-        self.place = self.enterContext(lab())
+        self.place = self.enterContext(lab(config=None))
 
     def start(self, config=None):
         self.station = self.place.start_station(config=config)
@@ -26,8 +25,12 @@ class StalenessTest(unittest.TestCase):
         port = self.proxy.port()
         self.place._start("sim-1", "rheonaut-sim", "--station", f"127.0.0.1:{port}", "--id", "sim-1", "--sensor", "perfect")
         self.station.wait_for_robot("sim-1")
-        self.station.command("sim-1", "set_mode", mode="auto", setpoint_m=0.1)
-        wait_until(lambda: self.robot()["setpoint_m"] == 0.1, 10, "the setpoint in telemetry")
+        def is_there():
+            if self.robot()["setpoint_m"] == 0.1:
+                return True
+            commanded(self.station, "set_mode", mode="auto", setpoint_m=0.1)  # again where the link was lost meanwhile
+            return False
+        wait_until(is_there, 60, "the setpoint in telemetry")
 
     def robot(self):
         return self.station.robot("sim-1")
@@ -73,7 +76,7 @@ class StalenessTest(unittest.TestCase):
         return seen
 
     def test_of_setpoints_that_are_still_worth_something_only_the_newest_acts(self):
-        self.start(PATIENT)
+        self.start(PATIENT)  # a stall of 2 s is no lost link
         run_id = self.station.post("/api/v1/runs", {"robot_id": "sim-1", "name": "stall"})["run_id"]
         answers, late = self.stall_and_send(life_ms=10_000)
         states = [self.state_of(answer) for answer in answers]
@@ -81,7 +84,7 @@ class StalenessTest(unittest.TestCase):
         # The last that went ahead of the stall may be seen in telemetry before the newest is sent.
         self.assertLessEqual(set(states[:-1]), {"superseded", "verified"}, states)
         self.assertLessEqual(states[:-1].count("verified"), 1 + late, states)
-        wait_until(lambda: self.robot()["setpoint_m"] == SETPOINTS[-1], 10, "the newest in telemetry")
+        wait_until(lambda: self.robot()["setpoint_m"] == SETPOINTS[-1], 60, "the newest in telemetry")
         self.station.post(f"/api/v1/runs/{run_id}/end")
         # The newest is sent when those that went ahead of the stall are answered: the last of them may act for a tick.
         seen = self.setpoints_seen(run_id)
@@ -89,7 +92,7 @@ class StalenessTest(unittest.TestCase):
         self.assertLessEqual(len(seen), 3 + late, seen)
 
     def test_setpoints_older_than_their_life_never_act(self):
-        self.start(PATIENT)
+        self.start(PATIENT)  # a stall of 2 s is no lost link
         run_id = self.station.post("/api/v1/runs", {"robot_id": "sim-1", "name": "stall"})["run_id"]
         answers, late = self.stall_and_send(life_ms=200)
         in_time = len(SETPOINTS) - late
@@ -97,7 +100,7 @@ class StalenessTest(unittest.TestCase):
         # "unknown": sent before the stall showed, and answered after its caller had to be told something.
         self.assertLessEqual(set(states), {"expired", "superseded", "unknown"}, states)
         seen = self.robot()["next_seq"]
-        wait_until(lambda: self.robot()["next_seq"] > seen + 100, 20, "another second of samples")
+        wait_until(lambda: self.robot()["next_seq"] > seen + 100, 60, "another second of samples")
         self.station.post(f"/api/v1/runs/{run_id}/end")
         self.assertLessEqual(set(self.setpoints_seen(run_id)), {0.1, *SETPOINTS[in_time:]})
         self.assertGreater(in_time, 0, "the machine sent none within the stall")
@@ -105,15 +108,15 @@ class StalenessTest(unittest.TestCase):
     def test_a_stall_beyond_the_time_out_is_a_lost_link_and_nothing_moves_after_it(self):
         self.start()
         answers, _ = self.stall_and_send(life_ms=10_000)
-        self.station.wait_for_robot("sim-1", timeout_s=30)
+        self.station.wait_for_robot("sim-1")
         states = [self.state_of(answer) for answer in answers]
         # "superseded": by a newer one, before the link was held for lost. "rejected": by the robot, which is in manual
         # when it comes back; that happens where the machine is slow, and the last ones are sent after the stall.
         self.assertLessEqual(set(states), {"unknown", "failed", "not_connected", "superseded", "rejected"}, states)
         self.assertIn("not_connected", states, "the link was held for lost within the stall")
         seen = self.robot()["next_seq"]
-        wait_until(lambda: self.robot()["next_seq"] > seen + 100, 20, "another second of samples")
-        robot = self.robot()
+        wait_until(lambda: self.robot()["next_seq"] > seen + 100, 60, "another second of samples")
+        robot = self.robot()  # a link that breaks once more changes none of it
         self.assertEqual((robot["mode"], robot["setpoint_m"], robot["sample"]["duty"]), ("manual", None, 0.0))
 
 

@@ -1,11 +1,12 @@
 """`rheonaut stop` with a running station and simulated robots: confirmed, not confirmed, and no station to ask."""
+import concurrent.futures
 import json
 import signal
 import subprocess
 import time
 import unittest
 
-from processes import BIN, commanded, lab, wait_until
+from processes import BIN, lab, swimming, wait_until
 
 
 class StopTest(unittest.TestCase):
@@ -28,9 +29,8 @@ class StopTest(unittest.TestCase):
         processes = {}
         for robot in robots:
             processes[robot] = place.start_robot(station, robot)
-            station.wait_for_robot(robot, timeout_s=60)
-            commanded(station, "set_mode", robot, mode="auto", setpoint_m=0.5)
-            wait_until(lambda: station.robot(robot)["sample"]["duty"] > 0.5, 60, f"the motor of {robot} runs")
+            station.wait_for_robot(robot)
+            swimming(station, robot)
         return station, processes
 
     def assert_latched(self, station, robot):
@@ -65,7 +65,7 @@ class StopTest(unittest.TestCase):
             self.stop_with(place, 0, "--all")
 
     def test_a_silent_robot_is_not_confirmed_and_holds_up_no_other(self):
-        with lab() as place:
+        with lab(config=None) as place:
             station, processes = self.moving(place, "sim-1", "sim-2")
             processes["sim-1"].send_signal(signal.SIGSTOP)
             try:
@@ -95,8 +95,9 @@ class StopTest(unittest.TestCase):
             station, _ = self.moving(place, "sim-1")
             place.station_process.send_signal(signal.SIGSTOP)
             try:
-                for words in (("sim-1",), ("--all",)):
-                    hung = self.stop(place, *words)
+                with concurrent.futures.ThreadPoolExecutor() as both:
+                    answers = both.map(lambda words: self.stop(place, words), ("sim-1", "--all"))
+                for hung in answers:
                     self.assertEqual((hung.returncode, hung.stdout), (1, ""))
                     self.assertRegex(hung.stderr, r"^rheonaut: .*has not answered within 7 s; IT IS NOT KNOWN")
             finally:

@@ -62,7 +62,7 @@ class SupervisionTest(unittest.TestCase):
             self.assertEqual("WATCHDOG=1", self.next_word())
         process.send_signal(signal.SIGSTOP)
         stat = pathlib.Path(f"/proc/{process.pid}/stat")
-        wait_until(lambda: stat.read_text().rsplit(")", 1)[1].split()[0] == "T", 10, "the station halted")
+        wait_until(lambda: stat.read_text().rsplit(")", 1)[1].split()[0] == "T", 60, "the station halted")
         self.assertTrue(self.nothing_said(for_s=2 * WATCHDOG_US / 1e6))
         process.send_signal(signal.SIGCONT)
         self.assertEqual("WATCHDOG=1", self.next_word())

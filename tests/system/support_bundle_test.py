@@ -9,7 +9,7 @@ import unittest
 import urllib.request
 import zipfile
 
-from processes import lab, wait_until
+from processes import PATIENT, lab, wait_until
 from station_api import trust
 
 PASSWORD = "hunter2-Staple-9"
@@ -88,7 +88,7 @@ class SupportBundleTest(unittest.TestCase):
                 self.assertNotIn(form.lower(), content.lower(), f"{what} is in {name}")
 
     def test_no_secret_is_in_it(self):
-        with lab(config='[tls]\nmode = "on"\n[http]\nhosts = ["plantedhost.example"]\n') as place:
+        with lab(config=PATIENT + '[tls]\nmode = "on"\n[http]\nhosts = ["plantedhost.example"]\n') as place:
             made = place.tool("certificate", "--data", place.data).stdout
             station = place.start_station()
             pin = re.search(r"^pin +([0-9a-f]{64})$", made, re.M).group(1)

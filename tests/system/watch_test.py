@@ -27,7 +27,7 @@ class WatchTest(unittest.TestCase):
             self.assertEqual((missing.returncode, missing.stdout), (1, ""))
             station = place.start_station()
             robot = place.start_robot(station, "sim-1")
-            station.wait_for_robot("sim-1", timeout_s=60)
+            station.wait_for_robot("sim-1")
             fresh = wait_until(lambda: re.search(r"(?m)^sim-1 +manual +-?\d+\.\d ± \d+\.\d +-?\d+ % +0\.\d s",
                                                  self.watch(place, "--once").stdout), 60, "fresh values")
             self.assertNotIn("\x1b", fresh.string)
@@ -51,7 +51,7 @@ class WatchTest(unittest.TestCase):
         with lab() as place:
             station = place.start_station()
             place.start_robot(station, "sim-1")
-            station.wait_for_robot("sim-1", timeout_s=60)
+            station.wait_for_robot("sim-1")
             for end in (lambda process, terminal: process.send_signal(signal.SIGINT),
                         lambda process, terminal: os.write(terminal, b"q")):
                 terminal, inner = pty.openpty()
@@ -96,7 +96,7 @@ class WatchTest(unittest.TestCase):
         with lab() as place:
             station = place.start_station()
             robot = place.start_robot(station, "sim-1")
-            station.wait_for_robot("sim-1", timeout_s=60)
+            station.wait_for_robot("sim-1")
             station.post("/api/v1/robots/sim-1/emergency-stop")
             with self.on_a_terminal(place) as terminal:
                 self.read_until(terminal, lambda text: re.search("\x1b\\[1;31msim-1 .*STOPPED: operator.*\x1b\\[0m", text))
