@@ -4,6 +4,7 @@
     everything        what decides how all of it is built has changed
     program NAME      a test program, all of its cases
     test NAME         a test of CTest
+    story NAME        a story of tests/browser
     lx106             the core on the chip's instruction set, which another preset has
 
 Usage: deploy/reach.py FILE... (paths from the top of the tree; a deleted file is named as well)
@@ -31,8 +32,9 @@ SCRIPTS = {"rules_test": "tests/check_rules", "docs_test": "tests/check_docs", "
            "second_try_test": "tests/second_try", "chip_judge_test": "tests/lx106/judge", "reach_test": "deploy/reach",
            "tidy_test": "deploy/tidy", "arm64_test": "deploy/arm64", "esp8266_check_test": "deploy/esp8266-check",
            "backup_daily_test": "deploy/debian/backup-daily"}
-# The programs together, in half a minute: a stop by every way, a station that is killed.
+# The programs together: a stop by every way, a station that is killed. The page with them: a key that stops.
 TOGETHER = ("system_stop", "system_kill")
+STORY = "escape"
 LX106 = re.compile(r"(robot_fw|protocol|sim_robot/(world|robot|network|faults|scenario|lab)|control/models|tests/lx106)/|"
                    r"deploy/(lx106|esp8266)")
 DOCUMENT = re.compile(r"[^/]*\.md$|docs/|site/|tests/site/|deploy/(site|npm-packages)$")
@@ -112,26 +114,15 @@ class Tree:
         return "\n".join(file.read_text(encoding="utf-8") for file in [*files, self.listings[program]] if file.exists())
 
     def scripts(self):
-        """(CTest's name, its text with that of the modules that it imports, their paths) of each test with processes."""
+        """(CTest's name or "story NAME", its text with that of the modules that it imports, their paths) of each test with
+        processes."""
         for path in sorted((self.root / "tests/system").glob("*_test.py")):
             yield ("system_" + path.name[:-len("_test.py")], *self._script(path))
-        yield from self._browser_scripts()
+        for path in sorted((self.root / "tests/browser").glob("*_test.mjs")):
+            name = path.name[:-len("_test.mjs")]
+            yield ("browser_programs" if name == "programs" else f"story {name}", *self._script(path))
         for path in (self.root / "tests/server/cli").glob("documented_commands_test.py"):
             yield ("documented_commands", *self._script(path))
-
-    def _browser_scripts(self):
-        """The stories of a group are one test; a *_test.mjs in no group is one by itself."""
-        folder = self.root / "tests/browser"
-        listing = folder / "CMakeLists.txt"
-        text = re.sub(r"#[^\n]*", "", listing.read_text(encoding="utf-8")) if listing.exists() else ""
-        alone = {path.name for path in folder.glob("*_test.mjs")}
-        for name, stories in re.findall(r"^browser_stories\((\w+)([^)]*)\)", text, re.M):
-            files = [f"{story}_test.mjs" for story in stories.split()]
-            alone -= set(files)
-            scripts = [self._script(folder / file) for file in ("stories.mjs", *files)]
-            yield (name, "".join(text for text, _ in scripts), set().union(*(paths for _, paths in scripts)))
-        for file in sorted(alone):
-            yield ("browser_" + file[:-len("_test.mjs")], *self._script(folder / file))
 
     def _script(self, path):
         seen, waiting, text = set(), [path], ""
@@ -185,8 +176,11 @@ def reached(root, changed):
             lines.add(f"program {program}")
         if any(path.startswith(f"tests/data/fuzz/{program.removesuffix('_fuzz_replay')}/") for path in changed):
             lines.add(f"program {program}")
-    lines |= {f"test {name}" for name in process_tests(tree, changed, nodes, others)}
-    lines |= {f"test {name}" for name in web_tests(tree, changed)}
+    lines |= {name if " " in name else f"test {name}" for name in process_tests(tree, changed, nodes, others)}
+    if any(path.startswith("web/") or path == "server/api/openapi.yaml" for path in changed):
+        lines.add("test web_.*")
+    if any(re.match(r"web/(?!tests/)", path) or path == "tests/browser/stories.mjs" for path in changed):
+        lines.add(f"story {STORY}")
     if nodes & tree.closure({"server/main", "sim_robot/main"}):
         lines.add("program goldens_test")  # it runs both
     if any(LX106.match(path) for path in changed):
@@ -225,13 +219,6 @@ def process_tests(tree, changed, nodes, others):
     if any(path.startswith("tests/protocol/") or path.endswith("golden_frames.txt") for path in changed) \
             or "protocol" in nodes:
         yield "golden_frames_by_protoc"
-
-
-def web_tests(tree, changed):
-    if any(path.startswith("web/") or path == "server/api/openapi.yaml" for path in changed):
-        yield "web_.*"
-    if any(re.match(r"web/(?!tests/)", path) or path == "tests/browser/CMakeLists.txt" for path in changed):
-        yield from (name for name, _, _ in tree.scripts() if name.startswith("browser_"))
 
 
 if __name__ == "__main__":

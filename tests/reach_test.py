@@ -41,11 +41,9 @@ SMALL_TREE = {
     "tests/browser/fleet_test.mjs": "import { hold } from './hands.mjs';\n",
     "tests/browser/runs_test.mjs": "import { Bench } from './programs.mjs';\n",
     "tests/browser/programs_test.mjs": "import { until } from './programs.mjs';\n",
-    "tests/browser/CMakeLists.txt": "function(browser_stories name)\nendfunction()\n# browser_stories(browser_no_more fleet)\n"
-                                    "browser_stories(browser_stops escape fleet)\nbrowser_stories(browser_runs runs)\n",
+    "tests/check_docs.py": "",
 }
-BROWSER = {"test browser_stops", "test browser_runs", "test browser_programs"}
-PROCESSES = {"test system_kill", "test system_proxy", "program goldens_test"} | BROWSER
+PROCESSES = {"test system_stop", "test system_kill", "program goldens_test"}  # after a change of a program
 
 
 class ReachTest(unittest.TestCase):
@@ -62,6 +60,8 @@ class ReachTest(unittest.TestCase):
         lines = set(reach.reached(self.root, changed.split()))
         checks = {f"test {name}" for name in reach.CHECKS}
         self.assertLessEqual(checks, lines, "the checks run after every change")
+        if changed.endswith(reach.CPP):
+            reached = {*reached, "test format"}
         self.assertEqual(lines - checks, set(reached), changed)
 
     def test_a_source_reaches_what_includes_its_room_and_the_programs(self):
@@ -83,8 +83,8 @@ class ReachTest(unittest.TestCase):
         self.expect("tests/server/CMakeLists.txt", {"program net_test", "program page_test"})
 
     def test_what_a_test_reads_reaches_it(self):
-        self.expect("docs/page.md", {"program page_test", "test site", "test docs_commands", "test docs_not_yet"})
-        self.expect("docs/other.md", {"test site", "test docs_commands", "test docs_not_yet"})
+        self.expect("docs/page.md", {"program page_test", "test docs_commands", "test docs_not_yet"})
+        self.expect("docs/other.md", {"test docs_commands", "test docs_not_yet"})
         self.expect("tests/data/listener_cases.json", {"program net_test"})
         self.expect("tests/data/fuzz/frame/1", {"program frame_fuzz_replay"})
 
@@ -100,18 +100,23 @@ class ReachTest(unittest.TestCase):
     def test_a_script_reaches_itself_and_those_that_import_it(self):
         self.expect("tests/system/kill_test.py", {"test system_kill"})
         self.expect("tests/system/processes.py", {"test system_kill"})
-        self.expect("tests/browser/programs.mjs", BROWSER)
-        self.expect("tests/browser/escape_test.mjs", {"test browser_stops"})
-        self.expect("tests/browser/hands.mjs", {"test browser_stops"})
-        self.expect("tests/browser/stories.mjs", {"test browser_stops", "test browser_runs"})
+        self.expect("tests/browser/programs.mjs", {"story escape", "story runs", "test browser_programs"})
+        self.expect("tests/browser/escape_test.mjs", {"story escape"})
+        self.expect("tests/browser/hands.mjs", {"story fleet"})
+        self.expect("tests/browser/stories.mjs", {"story escape"})
         self.expect("tests/browser/programs_test.mjs", {"test browser_programs"})
-        self.expect("tests/browser/CMakeLists.txt", BROWSER)
         self.expect("examples/cart.py", {"test system_proxy"})
 
-    def test_the_page_reaches_its_own_tests_and_the_browsers(self):
-        self.expect("web/src/api.ts", {"test web"} | BROWSER)
-        self.expect("web/tests/api_test.ts", {"test web"})
-        self.expect("server/api/openapi.yaml", {"test web", "test docs_not_yet", "program page_test"} | PROCESSES)
+    def test_the_page_reaches_its_own_tests_and_one_story(self):
+        self.expect("web/src/api.ts", {"test web_.*", "story escape"})
+        self.expect("web/tests/api_test.ts", {"test web_.*"})
+        self.expect("server/api/openapi.yaml", {"test web_.*", "test docs_not_yet", "program page_test"} | PROCESSES)
+
+    def test_a_script_of_the_project_reaches_the_test_of_it(self):
+        self.expect("tests/check_docs.py", {"test docs_test"})
+        self.expect("tests/check_docs_test.py", {"test docs_test"})
+        self.expect("deploy/tidy", {"test tidy_test"})
+        self.expect("tests/tidy_test.py", {"test tidy_test"})
 
     def test_what_decides_how_it_is_built_reaches_everything(self):
         for path in ("CMakeLists.txt", "cmake/rooms.cmake", "tests/CMakeLists.txt", "deploy/test", ".ci/run"):
@@ -134,10 +139,15 @@ class ThisTreeTest(unittest.TestCase):
         known = {name for name, _, _ in reach.Tree(ROOT).scripts()}
         self.assertLessEqual({f"system_{name}" for name in written}, known)
 
-    def test_every_browser_test_is_one_of_ctest(self):
-        listing = (ROOT / "tests/browser/CMakeLists.txt").read_text(encoding="utf-8")
-        written = set(re.findall(r"^browser_stories\((\w+)", listing, re.M)) | set(re.findall(r"add_test\(NAME (browser_\w+)", listing))
-        self.assertEqual({name for name, _, _ in reach.Tree(ROOT).scripts() if name.startswith("browser_")}, written)
+    def test_what_runs_after_a_change_of_the_programs_and_of_the_page_is_there(self):
+        known = {name for name, _, _ in reach.Tree(ROOT).scripts()}
+        self.assertLessEqual({*reach.TOGETHER, f"story {reach.STORY}"}, known)
+
+    def test_every_test_of_a_script_is_one_of_ctest(self):
+        listing = (ROOT / "tests/CMakeLists.txt").read_text(encoding="utf-8")
+        self.assertLessEqual({*reach.SCRIPTS, *reach.CHECKS, "format"}, set(re.findall(r"add_test\(NAME (\w+)", listing)))
+        for script in reach.SCRIPTS.values():
+            self.assertTrue([*ROOT.glob(script), *ROOT.glob(script + ".py")], script)
 
 
 if __name__ == "__main__":

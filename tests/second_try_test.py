@@ -78,7 +78,9 @@ class SecondTryTest(unittest.TestCase):
         self.assertIn("tests/system/emergency_stop_test.py", named)
         self.assertIn("tests/browser/escape_test.mjs", named)
         self.assertTrue(all((second_try.ROOT / path).exists() for path in named), named)
-        self.assertTrue(second_try.is_guard(second_try.ROOT, ["node", str(second_try.ROOT / "tests/browser/escape_test.mjs")]))
+        self.assertTrue(second_try.is_guard(second_try.ROOT, ["python3", "-B", "tests/system/emergency_stop_test.py", "-v"]))
+        self.assertTrue(second_try.is_guard(second_try.ROOT, ["node", "tests/browser/stories.mjs", "cockpit", "escape"]))
+        self.assertFalse(second_try.is_guard(second_try.ROOT, ["node", "tests/browser/stories.mjs", "cockpit"]))
 
 
 if __name__ == "__main__":

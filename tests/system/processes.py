@@ -142,11 +142,12 @@ def swimming(station, robot_id="sim-1", setpoint_m=0.5):
 
 
 def stopped(station, robot_id="sim-1"):
-    """The record of a stop that the robot has confirmed. A machine that stands still may keep it from that in time: then
-    it is stopped again."""
+    """The record of one stop, once the robot has confirmed it: a machine that stands still may keep it from that in time,
+    and the station repeats the stop by itself until it is."""
+    record = station.post(f"/api/v1/robots/{robot_id}/emergency-stop")
     def confirmed():
-        record = station.post(f"/api/v1/robots/{robot_id}/emergency-stop")
-        return record["state"] in ("acknowledged", "verified") and record
+        now = station.get(f"/api/v1/commands/{record['command_id']}")
+        return now["state"] in ("acknowledged", "verified") and now
     return wait_until(confirmed, PATIENCE_S, f"a stop that {robot_id} confirms")
 
 
