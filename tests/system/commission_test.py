@@ -9,6 +9,7 @@ import subprocess
 import tempfile
 import unittest
 
+import processes
 from processes import BIN, commanded, lab, wait_until
 
 SOUND = '[electrode]\npreset = "ds550"\n'
@@ -34,6 +35,7 @@ def begin(place, robot, answers, attempt, terminal=None):
                                     "--answers", str(into / "answers.json"), "--into", str(into), "--json",
                                     *([] if terminal else ["--yes"])],
                                    stdin=terminal or subprocess.DEVNULL, stdout=out, stderr=said)
+    processes.hurry(process)  # whose signs of life the station waits for
     place.processes.append(process)
     return process, into
 

@@ -14,7 +14,7 @@ import threading
 import time
 import unittest
 
-from processes import BIN, FLEET, Station, lab, wait_until
+from processes import BIN, FLEET, Station, hurry, lab, wait_until
 from recording_audit import audit
 
 ROBOTS = int(os.environ.get("RHEONAUT_STORM_ROBOTS", 100))
@@ -33,6 +33,7 @@ class Robots:
     def __init__(self, address):
         self.process = subprocess.Popen([BIN / "rheonaut-sim", "--station", address, "--robots", str(ROBOTS), "--json"],
                                         stdout=subprocess.PIPE, text=True)
+        hurry(self.process)
         self.lines = []
         self.listener = threading.Thread(target=self.listen)
         self.listener.start()
