@@ -21,9 +21,13 @@ namespace {
 namespace asio = boost::asio;
 using namespace std::chrono_literals;
 
-// A fleet and its station on one loop.
+// A fleet and its station on one loop, in real time. A stall of the machine costs ticks and may cost a connection while
+// it is made, but no sample that was made: the links outlive a silence of 5 s, the longest that robots accept, and a
+// ring holds 8 s.
 class FleetTest : public ::testing::Test {
  protected:
+  FleetTest() { sink.link_timeout_ms = 5000; }
+
   void start(int robots) {
     Fleet::Members members;
     for (int i = 1; i <= robots; ++i) {
@@ -51,10 +55,10 @@ class FleetTest : public ::testing::Test {
   }
   StationAddress station() const { return {"127.0.0.1", std::to_string(sink.port())}; }
 
-  // Runs the loop until the condition holds; false when it does not within 20 s.
+  // Runs the loop until the condition holds. Returns false after 2 min: the wait ends then, and no time is judged.
   template <class Condition>
   bool run_until(Condition condition) {
-    const auto give_up_at = std::chrono::steady_clock::now() + 20s;
+    const auto give_up_at = std::chrono::steady_clock::now() + 2min;
     while (!condition() && std::chrono::steady_clock::now() < give_up_at) loop.run_one_for(100ms);
     return condition();
   }
@@ -109,10 +113,7 @@ TEST_F(FleetTest, RobotsAreSpreadOverTheSlots) {
   std::map<std::int64_t, int> robots_at;  // by slot of the period
   for (std::size_t i = 0; i < 20; ++i) {
     const auto at = fleet->robot(i).next_tick_at().time_since_epoch();
-    ++robots_at[std::chrono::duration_cast<std::chrono::microseconds>(at -
-                                                                      fleet->robot(0).next_tick_at().time_since_epoch())
-                    .count() %
-                10'000];
+    ++robots_at[std::chrono::duration_cast<std::chrono::microseconds>(at).count() % 10'000];
   }
   EXPECT_EQ(robots_at.size(), 4u);
   for (const auto& [at, robots] : robots_at) EXPECT_EQ(robots, 5) << at;
@@ -124,12 +125,14 @@ TEST_F(FleetTest, AStationThatComesBackGetsWhatTheRingsHeld) {
   ASSERT_TRUE(all_acknowledged(5, 20));
   sink.close();
   const std::uint64_t made_before = fleet->counts().samples.made;
-  ASSERT_TRUE(run_until([&] { return fleet->counts().samples.made > made_before + 5 * 100; }));
+  ASSERT_TRUE(run_until([&] {
+    const FleetCounts now = fleet->counts();
+    return now.samples.made > made_before + 5 * 100 && now.links.unreachable > 0;
+  }));
   sink.open();
   ASSERT_TRUE(all_acknowledged(5, fleet->robot(0).samples().made));
   const FleetCounts counts = fleet->counts();
   EXPECT_EQ(counts.reconnects, 5u);
-  EXPECT_GT(counts.links.unreachable, 0u);
   EXPECT_GT(counts.samples.resent, 0u);
   EXPECT_EQ(counts.samples.lost, 0u);
   for (const auto& [id, boot] : sink.boots()) EXPECT_EQ(boot.missing, 0u);
@@ -249,8 +252,9 @@ TEST_F(FleetTest, AReplayedRobotSendsAgainAfterAnOutageAndOnRequest) {
 
   ASSERT_TRUE(run_until([&] { return fleet->robot(0).samples().held < 50; })) << "the backfill is over";
   sink.acknowledges = false;
+  while (loop.poll() > 0) continue;  // the last acknowledgement arrives
   ASSERT_TRUE(run_until([&] { return fleet->robot(0).samples().held >= 90; }));
-  const std::uint64_t acknowledged = fleet->robot(0).samples().acknowledged;  // by now none is under way
+  const std::uint64_t acknowledged = fleet->robot(0).samples().acknowledged;
   const std::uint64_t repeated_before = stored("sim-1").repeated;
   protocol::StationFrame ask = rheonaut_StationFrame_init_zero;
   ask.which_body = rheonaut_StationFrame_heartbeat_tag;

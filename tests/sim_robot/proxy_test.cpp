@@ -147,8 +147,8 @@ TEST_F(ProxyTest, AnOutageMayEndInAReset) {
 }
 
 TEST_F(ProxyTest, AnUnreachableTargetClosesTheClientWithALineAndTheProxyGoesOn) {
-  const std::string port = std::to_string(target.local_endpoint().port());
-  target.close();
+  const tcp::socket nobody{loop, {asio::ip::address_v4::loopback(), 0}};  // has the port, and does not listen
+  const std::string port = std::to_string(nobody.local_endpoint().port());
   ProxyOptions options;
   options.target = {"127.0.0.1", port};
   start(options);

@@ -56,6 +56,7 @@ class RobotThroughProxy : public ProxyTest {
     if (received.which_body == rheonaut_RobotFrame_hello_tag) {
       frame.which_body = rheonaut_StationFrame_welcome_tag;
       frame.body.welcome.protocol_version = protocol::kProtocolVersion;
+      frame.body.welcome.link_timeout_ms = link_timeout_ms;
     }
     if (received.which_body == rheonaut_RobotFrame_telemetry_tag) ++samples;
     if (received.which_body == rheonaut_RobotFrame_hello_tag) hello = received.body.hello;
@@ -76,7 +77,14 @@ class RobotThroughProxy : public ProxyTest {
     return run_until([&] { return robot->robot().core().link_up() && samples > received + 5; });
   }
 
+  // What is on its way arrives, also on a busy machine.
+  void settle() {
+    loop.run_for(50ms);
+    while (loop.poll() > 0) continue;
+  }
+
   protocol::FrameReader reader;
+  std::uint32_t link_timeout_ms = 5000;  // of the next connection: it outlives a stall of the machine
   int connections = 0, samples = 0;
   protocol::Hello hello = rheonaut_Hello_init_zero;
   std::uint32_t missed_ticks = 0;
@@ -85,11 +93,16 @@ class RobotThroughProxy : public ProxyTest {
 
 TEST_F(RobotThroughProxy, ComesBackAfterACutAResetAndHalfOpen) {
   begin();
+  const auto boot_id = hello.boot_id;
   proxy->control("cut 3");
   EXPECT_TRUE(comes_back());
   proxy->control("reset");
   EXPECT_TRUE(comes_back());
   EXPECT_FALSE(said("silent"));
+  EXPECT_EQ(hello.boot_id, boot_id);
+  link_timeout_ms = 300;
+  proxy->control("cut");
+  EXPECT_TRUE(comes_back());
   proxy->control("half-open");
   EXPECT_TRUE(comes_back());
   EXPECT_TRUE(said("the station is silent"));
@@ -107,9 +120,11 @@ TEST_F(RobotThroughProxy, KeepsItsLinkSplitDelayedAndThrottled) {
 }
 
 TEST_F(RobotThroughProxy, ComesBackAfterAnOutage) {
+  link_timeout_ms = 300;
   begin();
-  proxy->control("outage 1.5");
+  proxy->control("outage 600");
   ASSERT_TRUE(run_until([&] { return robot->robot().core().link_lost(); }));
+  proxy->control("outage 0.1");  // it ends by itself, and not before the robot has noticed it
   EXPECT_TRUE(comes_back());
   EXPECT_FALSE(robot->robot().core().link_lost());
 }
@@ -141,7 +156,7 @@ off_for_s = 0.3
   begin({}, scenario.faults);
   const auto boot_id = hello.boot_id;
   EXPECT_TRUE(comes_back_after(1));
-  EXPECT_EQ(hello.boot_id, boot_id);
+  if (robot->life().boots() == 1) EXPECT_EQ(hello.boot_id, boot_id);  // a stall may bring both faults at once
   EXPECT_TRUE(said("at 0.5 s: link_reset"));
   ASSERT_TRUE(run_until([&] { return robot->life().boots() == 2; }));
   ASSERT_TRUE(run_until([&] { return hello.boot_id != boot_id; }));
@@ -151,6 +166,7 @@ off_for_s = 0.3
 }
 
 TEST_F(RobotThroughProxy, AnOutageOnDemandLastsUntilItIsWithdrawn) {
+  link_timeout_ms = 300;
   begin();
   const auto id = inject(R"({"fault":"link_outage"})");
   ASSERT_TRUE(run_until([&] { return robot->robot().core().link_lost(); }));
@@ -187,7 +203,7 @@ TEST_F(RobotThroughProxy, SettingsOnDemandEndByThemselvesAndLeaveTheOthers) {
 TEST_F(RobotThroughProxy, ABlockedLoopSaysNothingMissesTicksAndGoesOn) {
   begin();
   inject(R"({"fault":"block","for_s":0.4})");
-  loop.run_for(50ms);  // what was under way
+  settle();
   const int received = samples;
   ASSERT_TRUE(run_until([&] { return robot->faults().in_force().empty(); }));
   EXPECT_LE(samples, received + 1);

@@ -51,17 +51,23 @@ void StoredBoot::pass_over_gaps(std::uint64_t oldest_seq) {
   }
 }
 
-TelemetrySink::TelemetrySink(asio::io_context& loop, std::uint16_t port) : acceptor_(loop), port_(port) { open(); }
+TelemetrySink::TelemetrySink(asio::io_context& loop, std::uint16_t port) : reserved_(loop), acceptor_(loop) {
+  bind(reserved_, port);
+  open();
+}
 
 TelemetrySink::~TelemetrySink() { close(); }
 
+void TelemetrySink::bind(tcp::acceptor& acceptor, std::uint16_t port) {
+  const tcp::endpoint endpoint{asio::ip::address_v4::loopback(), port};
+  acceptor.open(endpoint.protocol());
+  acceptor.set_option(tcp::acceptor::reuse_address{true});
+  acceptor.bind(endpoint);
+}
+
 void TelemetrySink::open() {
-  const tcp::endpoint endpoint{asio::ip::address_v4::loopback(), port_};
-  acceptor_.open(endpoint.protocol());
-  acceptor_.set_option(tcp::acceptor::reuse_address{true});
-  acceptor_.bind(endpoint);
+  bind(acceptor_, port());
   acceptor_.listen();
-  port_ = acceptor_.local_endpoint().port();
   accept();
 }
 
@@ -135,7 +141,8 @@ bool TelemetrySink::welcome(Session& session, const protocol::Hello& hello) {
   session.boot->robot_id = hello.robot_id;
   ++session.boot->connections;
   session.acknowledged_at = Clock::now();
-  answer.body.welcome.durable_next_seq = session.boot->next_seq;
+  answer.body.welcome.link_timeout_ms = link_timeout_ms;
+  if (acknowledges) answer.body.welcome.durable_next_seq = session.boot->next_seq;
   send(session, answer);
   return true;
 }

@@ -39,8 +39,8 @@ class TelemetrySink {
   explicit TelemetrySink(boost::asio::io_context& loop, std::uint16_t port = 0);
   ~TelemetrySink();
 
-  std::uint16_t port() const { return port_; }
-  // Goes away with all connections, and comes back on the same port.
+  std::uint16_t port() const { return reserved_.local_endpoint().port(); }
+  // Goes away with all connections, and comes back on the same port, which no other program gets meanwhile.
   void close();
   void open();
 
@@ -54,11 +54,13 @@ class TelemetrySink {
 
   std::set<std::string> refused;              // robots that are not welcome
   std::chrono::milliseconds acks_every{200};  // to each robot
-  bool acknowledges = true;                   // otherwise its heartbeats say nothing is durable
+  std::uint32_t link_timeout_ms = 0;          // in its welcomes; 0: the robot's default
+  bool acknowledges = true;                   // otherwise its welcomes and heartbeats say that nothing is durable
   std::function<void(const protocol::RobotFrame&, const std::string& robot_id)> on_frame;
 
  private:
   struct Session;
+  static void bind(boost::asio::ip::tcp::acceptor& acceptor, std::uint16_t port);
   void accept();
   void read(const std::shared_ptr<Session>& session);
   bool take(Session& session, std::size_t size);
@@ -67,8 +69,8 @@ class TelemetrySink {
   void acknowledge(Session& session);
   static void send(Session& session, const protocol::StationFrame& frame);
 
+  boost::asio::ip::tcp::acceptor reserved_;  // has the port, and never listens
   boost::asio::ip::tcp::acceptor acceptor_;
-  std::uint16_t port_;
   std::set<std::shared_ptr<Session>> sessions_;
   std::map<std::uint64_t, StoredBoot> boots_;
   std::uint64_t frames_ = 0;
