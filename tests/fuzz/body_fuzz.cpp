@@ -7,6 +7,10 @@
 #include <cstdlib>
 
 #include "server/api/live_messages.hpp"
+#include "server/http/router.hpp"
+#include "server/identity/accounts.hpp"
+#include "server/live/live_feed.hpp"
+#include "server/live/robot_texts.hpp"
 #include "tests/server/api/api_fixture.hpp"
 
 namespace server {
@@ -29,8 +33,8 @@ class BodyStation : public ApiTest {
     ask("POST", "/api/v1/users", {{"name", "anna"}, {"role", "operator"}, {"password", "correct horse"}});
     ask("POST", "/api/v1/tokens", {{"name", "ci"}, {"scopes", "read"}});
     ask("POST", "/api/v1/runs", {{"robot_id", "r1"}, {"name", "first"}});
-    api->accounts().open_session("anna", "", "");
-    for (const http::Route& route : api->router().routes()) {
+    accounts().open_session("anna", "", "");
+    for (const http::Route& route : router().routes()) {
       if (route.method != "GET") patterns_.push_back(route.pattern);
     }
     patterns_.push_back(kLive);
@@ -88,7 +92,7 @@ class BodyStation : public ApiTest {
   }
 
   boost::asio::awaitable<void> answer(http::Request request, std::optional<http::Response>& into) {
-    into = co_await api->router().dispatch(std::move(request));
+    into = co_await router().dispatch(std::move(request));
   }
 
   void say(const std::string& text) {

@@ -11,6 +11,8 @@
 #include <vector>
 
 #include "server/api/live_messages.hpp"
+#include "server/live/live_feed.hpp"
+#include "server/live/robot_texts.hpp"
 #include "tests/server/api/api_fixture.hpp"
 
 namespace server {

@@ -2,6 +2,7 @@
 #include <fstream>
 #include <future>
 
+#include "server/identity/accounts.hpp"
 #include "server/storage/database/database.hpp"
 #include "tests/server/api/api_fixture.hpp"
 
@@ -67,11 +68,11 @@ TEST_F(AccountsTest, ATokenIsShownOnceAndStoredAsAHash) {
 
   identity::Accounts restarted = stored();
   EXPECT_EQ(restarted.caller_of_token(secret)->actor, "token:logger");
-  EXPECT_EQ(api->accounts().caller_of_token(secret)->actor, "token:logger");
+  EXPECT_EQ(accounts().caller_of_token(secret)->actor, "token:logger");
   clock.run_for(2min);
   EXPECT_EQ(stored().tokens().at(0).last_used_at_us / 60'000'000, (clock.utc_us() - 120'000'000) / 60'000'000);
   EXPECT_EQ(ask("POST", "/api/v1/tokens/logger/revoke").status, 200);
-  EXPECT_FALSE(api->accounts().caller_of_token(secret));
+  EXPECT_FALSE(accounts().caller_of_token(secret));
   EXPECT_FALSE(stored().caller_of_token(secret));
   EXPECT_EQ(ask("POST", "/api/v1/tokens/nothing/revoke").status, 404);
   EXPECT_EQ(make_token("logger")["status"], 409) << "the record of commands names it";
@@ -84,14 +85,14 @@ TEST_F(AccountsTest, AFailingDiskSignsNobodyOutAndNobodyIn) {
   connect_robot();
   ASSERT_EQ(make_user("anna"), 201);
   const std::string token_secret = make_token("button", "stop")["secret"];
-  const std::string before = api->accounts().open_session("", "", "");
+  const std::string before = accounts().open_session("", "", "");
   clock.settle();
   {
     const SQLite::Database lock = lock_disk();
     const json credentials{{"user", "anna"}, {"password", "correct horse"}};
     EXPECT_EQ(ask("POST", "/api/v1/login", credentials).status, 200) << "kept in memory until it can be stored";
-    EXPECT_TRUE(api->accounts().caller_of_session(before));
-    EXPECT_TRUE(api->accounts().caller_of_token(token_secret));
+    EXPECT_TRUE(accounts().caller_of_session(before));
+    EXPECT_TRUE(accounts().caller_of_token(token_secret));
     auto stopping = begin("POST", "/api/v1/robots/r1/emergency-stop");
     ASSERT_TRUE(clock.run_until([&] { return !robot->commands().empty(); }, 1s));
     robot->acknowledge(robot->commands().at(0), rheonaut_COMMAND_RESULT_ACCEPTED, 9);
@@ -100,14 +101,13 @@ TEST_F(AccountsTest, AFailingDiskSignsNobodyOutAndNobodyIn) {
     const Answered refused = ask("POST", "/api/v1/tokens", {{"name", "new"}, {"scopes", "admin"}});
     EXPECT_EQ(refused.status, 503);
     EXPECT_EQ(refused.parsed()["reason"], "not_stored");
-    EXPECT_EQ(api->accounts().tokens().size(), 1U);
+    EXPECT_EQ(accounts().tokens().size(), 1U);
     const Answered revoked = ask("POST", "/api/v1/tokens/button/revoke");
     EXPECT_EQ(revoked.status, 503);
     EXPECT_NE(revoked.body.find("It is in force"), std::string::npos) << revoked.body;
-    EXPECT_FALSE(api->accounts().caller_of_token(token_secret));
+    EXPECT_FALSE(accounts().caller_of_token(token_secret));
     EXPECT_EQ(stored().sessions().size(), 1U);
-    const std::string ended =
-        "/api/v1/sessions/" + std::to_string(api->accounts().sessions().front().number) + "/revoke";
+    const std::string ended = "/api/v1/sessions/" + std::to_string(accounts().sessions().front().number) + "/revoke";
     const Answered session_ended = ask("POST", ended);
     EXPECT_EQ(session_ended.status, 503);
     EXPECT_EQ(session_ended.parsed()["reason"], "not_stored");
@@ -131,20 +131,20 @@ TEST_F(AccountsTest, AUserWhoIsRemovedWhileAChangeWaitsForTheDiskDoesNotComeBack
   identity::UserChange to_admin;
   to_admin.role = identity::Role::admin;
   const auto change = [&]() -> boost::asio::awaitable<void> {
-    EXPECT_TRUE(co_await api->accounts().change_user("anna", to_admin, by));
+    EXPECT_TRUE(co_await accounts().change_user("anna", to_admin, by));
   };
   const auto remove = [&]() -> boost::asio::awaitable<void> {
-    EXPECT_TRUE(co_await api->accounts().remove_user("anna", by));
+    EXPECT_TRUE(co_await accounts().remove_user("anna", by));
   };
   tasks.spawn("work before it", wait());
   tasks.spawn("a change", change());
   tasks.spawn("a removal", remove());
   loop.restart();
   loop.poll();
-  EXPECT_TRUE(api->accounts().users().empty()) << "at once";
+  EXPECT_TRUE(accounts().users().empty()) << "at once";
   gate.set_value();
   clock.settle();
-  EXPECT_TRUE(api->accounts().users().empty());
+  EXPECT_TRUE(accounts().users().empty());
   EXPECT_TRUE(stored().users().empty());
 }
 

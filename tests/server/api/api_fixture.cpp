@@ -12,6 +12,12 @@
 
 #include <fstream>
 
+#include "server/analysis/analysis_service.hpp"
+#include "server/api/api_server.hpp"
+#include "server/experiments/runner/experiments.hpp"
+#include "server/link/robot_listener.hpp"
+#include "server/station/models/model_sender.hpp"
+
 namespace server {
 namespace asio = boost::asio;
 
@@ -39,9 +45,35 @@ storage::RecorderOptions in_folder(storage::RecorderOptions options, const std::
 
 }  // namespace
 
+struct ApiTest::Parts {
+  explicit Parts(ApiTest& test)
+      : analysis{test.recording.history, test.maths},
+        live{test.clock},
+        security{test.clock, test.config},
+        robots{test.loop,    test.clock,       test.tasks,
+               test.station, test.recorder,    {asio::ip::address_v4::loopback(), 0},
+               false,        security.robots()},
+        experiments{{test.loop, test.clock, test.tasks, test.station},
+                    test.recording,
+                    test.maths,
+                    test.config.allow_unattended} {}
+
+  std::unique_ptr<station::ModelSender> models;  // made when the recording has started, like the API
+  analysis::AnalysisService analysis;
+  live::LiveFeed live;
+  net::TransportSecurity security;
+  link::RobotListener robots;
+  experiments::Experiments experiments;
+  std::unique_ptr<api::ApiServer> api;
+};
+
 ApiTest::ApiTest(config::Config of_station, storage::RecorderOptions of_recorder)
     : config{std::move(of_station)},
-      recording{loop, clock, disk, readers, exports, checkpoints, in_folder(std::move(of_recorder), folder.path())} {
+      recording{loop, clock, disk, readers, exports, checkpoints, in_folder(std::move(of_recorder), folder.path())},
+      parts_{std::make_unique<Parts>(*this)},
+      live{parts_->live},
+      security{parts_->security},
+      robots{parts_->robots} {
   clock.add_worker(disk);
   clock.add_worker(readers);
   clock.add_worker(checkpoints);
@@ -54,7 +86,8 @@ ApiTest::ApiTest(config::Config of_station, storage::RecorderOptions of_recorder
   bool started = false;
   tasks.spawn("start", start(recording, station, started));
   EXPECT_TRUE(clock.run_until([&] { return started; }, 10s));
-  models = std::make_unique<station::ModelSender>(loop, tasks, clock, station, recording.fluid_models.in_force());
+  parts_->models =
+      std::make_unique<station::ModelSender>(loop, tasks, clock, station, recording.fluid_models.in_force());
   api::ApiOptions options;
   options.endpoint = {asio::ip::address_v4::loopback(), 0};
   options.data_dir = folder.path();
@@ -65,12 +98,13 @@ ApiTest::ApiTest(config::Config of_station, storage::RecorderOptions of_recorder
   options.security = &security;
   options.password_cost = kCheapPasswords;
   options.foxglove = config.foxglove;
-  api = std::make_unique<api::ApiServer>(loop, tasks, clock, options, station, live, recording, analysis, experiments);
-  clock.add_worker(api->logins().worker());
+  parts_->api = std::make_unique<api::ApiServer>(loop, tasks, clock, options, station, live, recording,
+                                                 parts_->analysis, parts_->experiments);
+  clock.add_worker(logins().worker());
   recording.spawn(tasks);
   tasks.spawn("live feed", live.run());
-  tasks.spawn("api", api->run());
-  tasks.spawn("experiments", experiments.run());
+  tasks.spawn("api", parts_->api->run());
+  tasks.spawn("experiments", parts_->experiments.run());
   clock.settle();
 }
 
@@ -88,12 +122,22 @@ TestRobot& ApiTest::connect_robot() {
   return *robot;
 }
 
+std::uint16_t ApiTest::port() const { return parts_->api->port(); }
+
+std::string ApiTest::login_url() { return parts_->api->login_url(); }
+
+const http::Router& ApiTest::router() const { return parts_->api->router(); }
+
+identity::Accounts& ApiTest::accounts() { return parts_->api->accounts(); }
+
+const identity::Logins& ApiTest::logins() const { return parts_->api->logins(); }
+
 asio::awaitable<void> ApiTest::answer(http::Request request, std::shared_ptr<std::optional<Answered>> into) {
   Answered answered;
   answered.method = request.method;
-  const http::Route* route = api->router().find(request.method, request.target);
+  const http::Route* route = router().find(request.method, request.target);
   if (route != nullptr) answered.pattern = route->pattern;
-  answered.response = co_await api->router().dispatch(std::move(request));
+  answered.response = co_await router().dispatch(std::move(request));
   answered.status = answered.response.status;
   answered.body = answered.response.body;
   while (answered.response.stream != nullptr) {

@@ -1,17 +1,37 @@
 // A whole station with its API in virtual time, one hand-made robot, and clients that talk over real loopback sockets.
+//
+// The station's parts stand in api_fixture.cpp. A test that does more with a part than ApiTest offers includes the
+// part's own header.
 #pragma once
 
 #include <gtest/gtest.h>
 
 #include <filesystem>
+#include <map>
+#include <memory>
+#include <optional>
 #include <string>
 
-#include "server/analysis/analysis_service.hpp"
-#include "server/api/api_server.hpp"
-#include "server/experiments/runner/experiments.hpp"
-#include "server/station/models/model_sender.hpp"
+#include "server/http/http.hpp"
 #include "server/storage/recording_parts.hpp"
 #include "tests/server/link/test_robot.hpp"
+
+namespace server::http {
+class Router;
+}  // namespace server::http
+
+namespace server::identity {
+class Accounts;
+class Logins;
+}  // namespace server::identity
+
+namespace server::live {
+class LiveFeed;
+}  // namespace server::live
+
+namespace server::net {
+class TransportSecurity;
+}  // namespace server::net
 
 namespace server {
 
@@ -72,6 +92,13 @@ class ApiTest : public ::testing::Test {
   void make_samples(TestRobot& robot, std::uint64_t first_seq, pb_size_t count);
   std::string token() const;
 
+  // The server of the API.
+  std::uint16_t port() const;
+  std::string login_url();
+  const http::Router& router() const;
+  identity::Accounts& accounts();
+  const identity::Logins& logins() const;
+
   identity::Scopes scopes = identity::Scopes::of(identity::Role::admin);  // of who asks
   std::string actor = "token:local";                                      // likewise
   std::uint64_t session = 0;                                              // likewise: of a page
@@ -85,15 +112,16 @@ class ApiTest : public ::testing::Test {
   runtime::TaskGroup tasks{loop};
   station::Station station{loop, clock, config.envelope, config::LinkTimes{}};
   storage::RecordingParts recording;
-  std::unique_ptr<station::ModelSender> models;
   storage::Recorder& recorder{recording.recorder};
-  analysis::AnalysisService analysis{recording.history, maths};
-  live::LiveFeed live{clock};
-  net::TransportSecurity security{clock, config};
-  link::RobotListener robots{
-      loop, clock, tasks, station, recorder, {boost::asio::ip::address_v4::loopback(), 0}, false, security.robots()};
-  experiments::Experiments experiments{{loop, clock, tasks, station}, recording, maths, config.allow_unattended};
-  std::unique_ptr<api::ApiServer> api;
+
+ private:
+  struct Parts;  // all others
+  std::unique_ptr<Parts> parts_;
+
+ protected:
+  live::LiveFeed& live;
+  net::TransportSecurity& security;
+  link::RobotListener& robots;
   std::unique_ptr<TestRobot> robot;
 
  private:

@@ -1,6 +1,7 @@
 // Who did what, when and from where, as the route reports it: of commands, refusals, control, sign-ins and accounts.
 #include <gmock/gmock.h>
 
+#include "server/identity/accounts.hpp"
 #include "server/storage/database/database.hpp"
 #include "server/storage/upkeep/audit_check.hpp"
 #include "tests/server/api/live_page.hpp"
@@ -132,7 +133,7 @@ TEST_F(AuditRoutesTest, AccountsSessionsAndSignInsAreThereWithoutSecrets) {
   EXPECT_EQ(post("/api/v1/users/anna/change", {{"role", "operator"}, {"password", "correct mare"}}).status, 200);
   EXPECT_EQ(post("/api/v1/tokens", {{"name", "ci"}, {"scopes", "read"}}).status, 201);
   EXPECT_EQ(post("/api/v1/tokens/ci/revoke").status, 200);
-  api->accounts().open_session("", "10.0.0.5", "");
+  accounts().open_session("", "10.0.0.5", "");
   clock.run_for(200ms);
   EXPECT_EQ(post("/api/v1/sessions/2/revoke").status, 200);
   EXPECT_EQ(post("/api/v1/users/anna/remove").status, 200);
@@ -154,7 +155,7 @@ TEST_F(AuditRoutesTest, AccountsSessionsAndSignInsAreThereWithoutSecrets) {
 
 TEST_F(AuditRoutesTest, APagesMessagesComeFromItsAddress) {
   connect_robot();
-  Page page{clock, api->port(), "Authorization: Bearer " + token() + "\r\n"};
+  Page page{clock, port(), "Authorization: Bearer " + token() + "\r\n"};
   ASSERT_TRUE(page.open()) << page.answer;
   page.say({{"type", "emergency_stop"}, {"robot_id", "r1"}});
   ASSERT_TRUE(clock.run_until([&] { return !robot->commands().empty(); }, 1s));

@@ -4,6 +4,9 @@
 
 #include <fstream>
 
+#include "server/http/request_guard.hpp"
+#include "server/identity/accounts.hpp"
+#include "server/identity/auth.hpp"
 #include "tests/server/api/api_fixture.hpp"
 
 namespace server {

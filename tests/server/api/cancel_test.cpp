@@ -116,7 +116,7 @@ class CancelTest : public ApiTest {
 
   // How many questions the readers answer when the client asks this, and goes or stays while they are busy.
   std::uint64_t questions_for(const std::string& target, bool stays) {
-    QuietClient client{api->port()};
+    QuietClient client{port()};
     const std::uint64_t before = questions();
     stop_working(readers);
     client.send(head("GET " + target));
@@ -155,7 +155,7 @@ TEST_F(CancelTest, AnExportWhoseClientHasGoneAsksNoFurther) {
     const bool is_file = ending != std::string{".csv"};
     for (const bool is_written : {false, true}) {  // at its first question, or when some of it is made
       SCOPED_TRACE(std::string{ending} + (is_written ? ", written" : ", begun"));
-      QuietClient client{api->port()};
+      QuietClient client{port()};
       const std::uint64_t before = export_questions();
       client.send(head(std::string{"GET /api/v1/runs/1/samples"} + ending));
       poll_until([&] {
@@ -187,9 +187,9 @@ TEST_F(CancelTest, AStopIsAnsweredBesideQuestionsThatAreCancelled) {
   make_run();
   const std::uint64_t asked_before = questions();
   const std::uint64_t exported_before = export_questions();
-  QuietClient question{api->port()};
-  QuietClient file{api->port()};
-  QuietClient stop{api->port()};
+  QuietClient question{port()};
+  QuietClient file{port()};
+  QuietClient stop{port()};
   std::promise<void> gate;
   const std::shared_future<void> opened = gate.get_future().share();
   for (runtime::WorkerThread* worker : {&readers, &exports}) tasks.spawn("gate", hold(*worker, opened));
@@ -227,7 +227,7 @@ TEST_F(CancelTest, TheNextQuestionIsAnsweredAfterOneThatWasGivenUp) {
 // Requests sent ahead are no sign of leaving.
 TEST_F(CancelTest, AClientThatSendsAheadIsAnsweredInOrder) {
   make_run();
-  QuietClient client{api->port()};
+  QuietClient client{port()};
   client.send(head("GET /api/v1/runs/1/gaps") + head("GET /api/v1/robots/r9/gaps"));
   std::string answers;
   poll_until([&] {
@@ -241,7 +241,7 @@ TEST_F(CancelTest, AClientThatSendsAheadIsAnsweredInOrder) {
 // SAFETY: a stop, and whatever else changes something.
 TEST_F(CancelTest, APostIsCarriedOutThoughItsClientHasGone) {
   make_run();
-  QuietClient client{api->port()};
+  QuietClient client{port()};
   stop_working(disk);
   station::RobotEvent event;  // that the run's end must wait for
   event.robot_id = "r1";

@@ -1,4 +1,5 @@
 // /foxglove over a real socket: who is let in, by what, and that it changes nothing.
+#include "server/identity/accounts.hpp"
 #include "server/identity/tickets.hpp"
 #include "tests/server/api/live_page.hpp"
 
@@ -26,7 +27,7 @@ class FoxgloveSocketTest : public ApiTest {
     return url.substr(url.find("/foxglove"));
   }
   std::unique_ptr<Page> open(const std::string& target, const std::string& headers = kProtocol) {
-    return std::make_unique<Page>(clock, api->port(), headers, "127.0.0.1", [] {}, target);
+    return std::make_unique<Page>(clock, port(), headers, "127.0.0.1", [] {}, target);
   }
   static std::string ticket_of(const std::string& link) { return link.substr(link.find("ticket=") + 7); }
   json receive(Page& page, const std::string& op) {
@@ -61,7 +62,7 @@ TEST_F(FoxgloveSocketTest, ANewerClientIsAnsweredByItsOwnName) {
 
 TEST_F(FoxgloveSocketTest, NothingElseLetsIn) {
   const std::string bearer = "Authorization: Bearer " + token() + "\r\n";
-  const std::string session = api->accounts().open_session("", "", "");
+  const std::string session = accounts().open_session("", "", "");
   const std::string cookie = "Cookie: rheonaut_session_fedcba9876543210=" + session + "\r\n";
   ASSERT_TRUE(open("/live", cookie)->open()) << "it is a good cookie";
   for (const std::string& target : {std::string{"/foxglove"}, "/foxglove?ticket=" + token(),
@@ -102,10 +103,10 @@ TEST_F(FoxgloveSocketTest, AWrongRequestDoesNotUseTheTicketUp) {
   EXPECT_TRUE(open(link, "")->answer.starts_with("HTTP/1.1 400 ")) << "no sub-protocol";
   EXPECT_TRUE(open(link, "Sec-WebSocket-Protocol: foxglove.websocket.v2\r\n")->answer.starts_with("HTTP/1.1 400 "));
   EXPECT_TRUE(open(link + "&robot=nobody")->answer.starts_with("HTTP/1.1 404 "));
-  RawClient preview{clock, api->port()};
+  RawClient preview{clock, port()};
   preview.send("GET " + link + " HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n");
   EXPECT_TRUE(preview.read_to_end().starts_with("HTTP/1.1 426 ")) << "it is no WebSocket";
-  RawClient rebinding{clock, api->port()};
+  RawClient rebinding{clock, port()};
   rebinding.send("GET " + link + " HTTP/1.1\r\nHost: evil.example\r\nConnection: close\r\n\r\n");
   EXPECT_TRUE(rebinding.read_to_end().starts_with("HTTP/1.1 421 "));
   EXPECT_TRUE(open(link)->open());
@@ -114,7 +115,7 @@ TEST_F(FoxgloveSocketTest, AWrongRequestDoesNotUseTheTicketUp) {
 TEST_F(FoxgloveSocketTest, AClientEndsWithTheCredentialOfWhoMadeItsTicket) {
   const std::string secret = ask("POST", "/api/v1/tokens", {{"name", "eye"}, {"scopes", "read"}}).parsed()["secret"];
   const auto link_of = [&] {
-    RawClient asking{clock, api->port()};
+    RawClient asking{clock, port()};
     asking.send(
         "POST /api/v1/foxglove-links HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\nContent-Length: 0\r\n"
         "Authorization: Bearer " +
@@ -204,7 +205,7 @@ TEST(FoxgloveOff, IsAProblemThatSaysHowToTurnItOn) {
       EXPECT_EQ(link.parsed()["reason"], "foxglove_off");
       EXPECT_NE(link.body.find("[foxglove]"), std::string::npos);
       EXPECT_EQ(ask("GET", "/foxglove").parsed()["reason"], "foxglove_off");
-      const Page page{clock, api->port(), kProtocol, "127.0.0.1", [] {}, "/foxglove?ticket=x"};
+      const Page page{clock, port(), kProtocol, "127.0.0.1", [] {}, "/foxglove?ticket=x"};
       EXPECT_TRUE(page.answer.starts_with("HTTP/1.1 404 ")) << page.answer;
     }
 

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "server/net/transport_security.hpp"
 #include "tests/server/api/api_fixture.hpp"
 
 namespace server {
@@ -26,7 +27,7 @@ class HealthRoutesTest : public ApiTest {
   }
   // Over a socket, as a supervisor asks: without any credential.
   std::string get(const std::string& target) {
-    RawClient client{clock, api->port()};
+    RawClient client{clock, port()};
     client.send("GET " + target + " HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n");
     return client.read_to_end();
   }
@@ -110,7 +111,7 @@ class FewConnectionsTest : public HealthRoutesTest {
 };
 
 TEST_F(FewConnectionsTest, AnsweredThoughAllConnectionsAreTakenByIdleOnes) {
-  RawClient first{clock, api->port()}, second{clock, api->port()};
+  RawClient first{clock, port()}, second{clock, port()};
   const std::string request = "GET /api/v1/me HTTP/1.1\r\nHost: localhost\r\nAuthorization: Bearer " + token();
   for (RawClient* client : {&first, &second}) {
     client->send(request + "\r\n\r\n");

@@ -1,5 +1,7 @@
 // Slow and hostile clients of the HTTP port: what becomes of them, and that a robot is stopped all the while.
 #include "server/http/http_connection.hpp"
+#include "server/live/live_feed.hpp"
+#include "server/net/transport_security.hpp"
 #include "tests/server/api/live_page.hpp"
 
 namespace server {
@@ -15,7 +17,7 @@ class HostileTest : public ApiTest {
  protected:
   explicit HostileTest(config::Config of_station = {}) : ApiTest{std::move(of_station)} {
     connect_robot();
-    operator_ = std::make_unique<RawClient>(clock, api->port());
+    operator_ = std::make_unique<RawClient>(clock, port());
     expect_stops(*operator_);  // signed in before the trouble begins
   }
 
@@ -28,7 +30,7 @@ class HostileTest : public ApiTest {
            body;
   }
   std::unique_ptr<RawClient> dial(const char* from = "127.0.0.1") {
-    return std::make_unique<RawClient>(clock, api->port(), from);
+    return std::make_unique<RawClient>(clock, port(), from);
   }
 
   // The stop reaches the robot in the turn in which it arrives, and its answer the operator.
@@ -124,7 +126,7 @@ TEST_F(HostileTest, OversizedAndDeeplyNestedJsonIsRefused) {
   auto client = dial();
   client->send(post(command, wide));
   EXPECT_TRUE(client->read_until("\r\n").starts_with("HTTP/1.1 413 "));
-  Page page{clock, api->port(), "Authorization: Bearer " + token() + "\r\n"};
+  Page page{clock, port(), "Authorization: Bearer " + token() + "\r\n"};
   page.say_text(R"({"type":)" + std::string(2000, '['));
   EXPECT_EQ(page.receive("problem").at("problem").at("reason"), "malformed_json");
   page.say_text(R"({"type":")" + std::string(5000, 'x') + "\"}");
@@ -135,7 +137,7 @@ TEST_F(HostileTest, OversizedAndDeeplyNestedJsonIsRefused) {
 
 // The client stays alive and reads nothing: its messages wait within bounds, and then its connection ends.
 TEST_F(HostileTest, APageThatNeverReadsIsLetGo) {
-  Page page{clock, api->port(), "Authorization: Bearer " + token() + "\r\n"};
+  Page page{clock, port(), "Authorization: Bearer " + token() + "\r\n"};
   ASSERT_TRUE(page.open());
   station::SampleBatch batch;
   batch.robot_id = "r1";
@@ -161,7 +163,7 @@ TEST_F(HostileTest, APageThatNeverReadsIsLetGo) {
 
 // A flood of messages is the flooder's own wait; a stop is obeyed all the same.
 TEST_F(HostileTest, ATalkativePageIsReadABoundedNumberOfTimesASecond) {
-  Page page{clock, api->port(), "Authorization: Bearer " + token() + "\r\n"};
+  Page page{clock, port(), "Authorization: Bearer " + token() + "\r\n"};
   const std::size_t before = robot->commands().size();
   std::size_t stops_read = 0;
   for (int i = 0; i < 600; ++i) {
@@ -180,17 +182,17 @@ TEST_F(HostileTest, OneUserHasABoundedNumberOfPages) {
   const std::string bearer = "Authorization: Bearer " + token() + "\r\n";
   std::vector<std::unique_ptr<Page>> pages;
   for (std::size_t i = 0; i < http::kMaxPagesOfOne; ++i) {
-    pages.push_back(std::make_unique<Page>(clock, api->port(), bearer));
+    pages.push_back(std::make_unique<Page>(clock, port(), bearer));
     ASSERT_TRUE(pages.back()->open()) << i;
   }
-  EXPECT_TRUE(Page(clock, api->port(), bearer).answer.starts_with("HTTP/1.1 429 "));
+  EXPECT_TRUE(Page(clock, port(), bearer).answer.starts_with("HTTP/1.1 429 "));
   const json other = ask("POST", "/api/v1/tokens", {{"name", "other"}, {"scopes", "read,stop"}}).parsed();
   const std::string others = "Authorization: Bearer " + other.at("secret").get<std::string>() + "\r\n";
-  EXPECT_TRUE(Page(clock, api->port(), others).open()) << "somebody else's";
+  EXPECT_TRUE(Page(clock, port(), others).open()) << "somebody else's";
   expect_stops();
   pages.pop_back();
   clock.settle();
-  EXPECT_TRUE(Page(clock, api->port(), bearer).open());
+  EXPECT_TRUE(Page(clock, port(), bearer).open());
 }
 
 TEST_F(SmallHostileTest, IdleConnectionsOfKnownPeopleGiveWayAndBusyOnesStay) {
@@ -205,18 +207,18 @@ TEST_F(SmallHostileTest, IdleConnectionsOfKnownPeopleGiveWayAndBusyOnesStay) {
   clock.settle();
   std::vector<std::unique_ptr<Page>> pages;
   for (int i = 0; i < 12; ++i) {
-    pages.push_back(std::make_unique<Page>(clock, api->port(), bearer));
+    pages.push_back(std::make_unique<Page>(clock, port(), bearer));
     EXPECT_TRUE(pages.back()->open()) << i;
   }
   EXPECT_TRUE(dial()->read_to_end().starts_with("HTTP/1.1 429 ")) << "all of its places are in use";
   auto another = dial("127.0.0.9");
   expect_stops(*another);
   for (int i = 0; i < 3; ++i) {
-    pages.push_back(std::make_unique<Page>(clock, api->port(), bearer, "127.0.0.8"));
+    pages.push_back(std::make_unique<Page>(clock, port(), bearer, "127.0.0.8"));
     EXPECT_TRUE(pages.back()->open()) << i;
   }
   expect_stops(*another);
-  pages.push_back(std::make_unique<Page>(clock, api->port(), bearer, "127.0.0.8"));
+  pages.push_back(std::make_unique<Page>(clock, port(), bearer, "127.0.0.8"));
   EXPECT_TRUE(another->closed()) << "idle between two requests";
   EXPECT_TRUE(dial("127.0.0.7")->read_to_end().starts_with("HTTP/1.1 503 "));
   const std::size_t before = robot->commands().size();

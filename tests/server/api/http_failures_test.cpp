@@ -4,6 +4,11 @@
 #include "server/api/live_socket.hpp"
 #include "server/http/http_connection.hpp"
 #include "server/http/http_server.hpp"
+#include "server/http/request_guard.hpp"
+#include "server/identity/accounts.hpp"
+#include "server/identity/auth.hpp"
+#include "server/live/live_feed.hpp"
+#include "server/live/robot_texts.hpp"
 #include "tests/server/api/live_page.hpp"
 #include "tests/server/captured_log.hpp"
 
@@ -15,7 +20,7 @@ bool says(const std::string& answer, const std::string& part) { return answer.fi
 class HttpFailuresTest : public ApiTest {
  protected:
   std::string send(const std::string& method, const std::string& target, const std::string& body = "") {
-    RawClient client{clock, api->port()};
+    RawClient client{clock, port()};
     client.send(method + " " + target + " HTTP/1.1\r\nHost: localhost\r\nAuthorization: Bearer " + token() +
                 "\r\nContent-Type: application/json\r\nConnection: close\r\nContent-Length: " +
                 std::to_string(body.size()) + "\r\n\r\n" + body);
@@ -62,7 +67,7 @@ class Thrower final : public station::StationSink {
 
 TEST_F(HttpFailuresTest, AStopThatFailsOnceItIsSentIsLoggedAndThePageGoesOn) {
   connect_robot();
-  Page page{clock, api->port(), "Authorization: Bearer " + token() + "\r\n"};
+  Page page{clock, port(), "Authorization: Bearer " + token() + "\r\n"};
   Thrower thrower;
   station.add_sink(thrower);
   page.say({{"type", "emergency_stop"}, {"robot_id", "r1"}});

@@ -11,7 +11,7 @@ class HttpHeadTest : public ApiTest {
   }
   // Sends one request and reads until the station closes.
   std::string talk(const std::string& bytes) {
-    RawClient client{clock, api->port()};
+    RawClient client{clock, port()};
     client.send(bytes);
     return client.read_to_end();
   }
@@ -37,7 +37,7 @@ TEST_F(HttpHeadTest, FoldedLinesAndTwoHostsAre400) {
 // However the head is cut into pieces on its way.
 TEST_F(HttpHeadTest, AHeadInPiecesIsReadAsOne) {
   for (const std::size_t piece : {1U, 7U, 100U}) {
-    RawClient client{clock, api->port()};
+    RawClient client{clock, port()};
     const std::string request = head("GET /api/v1/robots", "Connection: close\r\n");
     for (std::size_t i = 0; i < request.size(); i += piece) {
       client.send(request.substr(i, piece));
@@ -50,7 +50,7 @@ TEST_F(HttpHeadTest, AHeadInPiecesIsReadAsOne) {
 TEST_F(HttpHeadTest, AFoldedLineIsRefusedWhereverTheHeadIsCut) {
   const std::string folded = head("GET /api/v1/robots", "X-Note: a\r\n Content-Length: 3\r\n");
   for (std::size_t cut = 1; cut < folded.size(); ++cut) {
-    RawClient client{clock, api->port()};
+    RawClient client{clock, port()};
     client.send(folded.substr(0, cut));
     clock.settle();
     client.send(folded.substr(cut));
@@ -102,7 +102,7 @@ TEST_F(HttpHeadTest, AMemberThatIsGivenTwiceIs400) {
 
 // Were it set again later, the answer to one tab could put an old session in the place of the newer one of another tab.
 TEST_F(HttpHeadTest, TheCookieIsSetBySigningInAndByNothingElse) {
-  const std::string url = api->login_url();
+  const std::string url = login_url();
   const std::string in = get(url.substr(url.find("/login")));
   const std::string name = "rheonaut_session_fedcba9876543210=";
   const auto begin = in.find("Set-Cookie: " + name) + 12;

@@ -1,5 +1,6 @@
 // HTTP over real loopback sockets: good manners, and every kind of bad ones.
 #include "server/http/http_connection.hpp"
+#include "server/net/transport_security.hpp"
 #include "tests/server/api/api_fixture.hpp"
 
 namespace server {
@@ -12,7 +13,7 @@ class HttpServerTest : public ApiTest {
   }
   // Sends one request and reads until the station closes.
   std::string talk(const std::string& bytes) {
-    RawClient client{clock, api->port()};
+    RawClient client{clock, port()};
     client.send(bytes);
     return client.read_to_end();
   }
@@ -51,7 +52,7 @@ TEST_F(HttpServerTest, EveryErrorHasTheSecurityHeaders) {
         head("GET /%2e%2e/", "Connection: close\r\n"), head("PUT /api/v1/robots", "Connection: close\r\n"),
         head("GET /api/v1/runs/1", "Connection: close\r\n"), head("POST /api/v1/runs", "Content-Length: 100000\r\n"),
         head("GET /login?code=x", "Connection: close\r\n"), late}) {
-    RawClient client{clock, api->port()};
+    RawClient client{clock, port()};
     client.send(request);
     if (request == late) clock.run_for(11s);
     const std::string answer = client.read_to_end();
@@ -77,13 +78,12 @@ TEST_F(HttpServerTest, WhatHoldsDataOrSetsACookieIsNotCached) {
     EXPECT_TRUE(answer.starts_with("HTTP/1.1 200")) << answer;
     EXPECT_TRUE(contains(answer, "Cache-Control: no-")) << target;
   }
-  const std::string url = api->login_url();
-  const std::string in = get(url.substr(url.find("/login")));
+  const std::string url = login_url(), in = get(url.substr(url.find("/login")));
   EXPECT_TRUE(contains(in, "Set-Cookie: ") && contains(in, "Cache-Control: no-store\r\n")) << in;
 }
 
 TEST_F(HttpServerTest, KeepsTheConnectionAndTakesPipelinedRequests) {
-  RawClient client{clock, api->port()};
+  RawClient client{clock, port()};
   client.send(head("GET /api/v1/robots") + head("GET /api/v1/robots"));
   client.read_until("{\"robots\":[]}");
   EXPECT_TRUE(client.read_until("{\"robots\":[]}").starts_with("HTTP/1.1 200"));
@@ -107,7 +107,7 @@ TEST_F(HttpServerTest, NoTokenIs401) {
 }
 
 TEST_F(HttpServerTest, TheLoginLinkGivesACookieOnce) {
-  const std::string url = api->login_url();
+  const std::string url = login_url();
   const std::string target = url.substr(url.find("/login"));
   const std::string request = "GET " + target + " HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n";
   const std::string answer = talk(request);
@@ -155,7 +155,7 @@ TEST_F(HttpServerTest, MalformedHttpIs400AndTheEnd) {
 }
 
 TEST_F(HttpServerTest, RefusesABigBodyWithoutReadingIt) {
-  RawClient client{clock, api->port()};
+  RawClient client{clock, port()};
   client.send(head("POST /api/v1/runs", "Content-Type: application/json\r\nContent-Length: 10485760\r\n"));
   EXPECT_TRUE(client.read_until("\r\n").starts_with("HTTP/1.1 413 "));
   expect_alive();
@@ -163,7 +163,7 @@ TEST_F(HttpServerTest, RefusesABigBodyWithoutReadingIt) {
 
 TEST_F(HttpServerTest, ABigBodyThatIsSentAllTheSameEnds) {
   for (const char* length : {"Content-Length: 10485760\r\n", "Transfer-Encoding: chunked\r\n"}) {
-    RawClient client{clock, api->port()};
+    RawClient client{clock, port()};
     const bool chunked = std::string_view{length}.starts_with("Transfer");
     client.send(head("POST /api/v1/runs", std::string{"Content-Type: application/json\r\n"} + length));
     client.send((chunked ? "a00000\r\n" : "") + std::string(10 * 1024 * 1024, ' '));
@@ -201,12 +201,12 @@ TEST_F(HttpServerTest, ACallerWithoutTheRightIsRefusedBeforeItsBodyArrives) {
       {"POST /api/v1/runs HTTP/1.1\r\nHost: localhost\r\nExpect: 100-continue\r\nContent-Length: 10\r\n\r\n", "401"},
   };
   for (const auto& one : cases) {
-    RawClient client{clock, api->port()};
+    RawClient client{clock, port()};
     client.send(one.head);
     EXPECT_TRUE(client.read_until("\r\n").starts_with(std::string{"HTTP/1.1 "} + one.status)) << one.head;
     EXPECT_TRUE(contains(client.read_until("\r\n\r\n"), "Connection: close"));
   }
-  RawClient drips{clock, api->port()};
+  RawClient drips{clock, port()};
   drips.send(
       "POST /api/v1/login HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\nTransfer-Encoding: "
       "chunked\r\n\r\n1400\r\n" +
@@ -226,7 +226,7 @@ TEST_F(HttpServerTest, TwoLengthsAre400) {
 }
 
 TEST_F(HttpServerTest, ASlowHeaderEndsAfterTenSeconds) {
-  RawClient client{clock, api->port()};
+  RawClient client{clock, port()};
   client.send("GET / HTTP/1.1\r\nHost: loc");
   clock.run_for(9s);
   EXPECT_FALSE(client.closed());
@@ -235,7 +235,7 @@ TEST_F(HttpServerTest, ASlowHeaderEndsAfterTenSeconds) {
 }
 
 TEST_F(HttpServerTest, ASlowBodyEndsAfterTenSecondsAlsoWhenItDrips) {
-  RawClient client{clock, api->port()};
+  RawClient client{clock, port()};
   client.send(head("POST /api/v1/runs", "Content-Type: application/json\r\nContent-Length: 100\r\n") + "{");
   for (int i = 0; i < 11; ++i) {
     client.send(" ");
@@ -245,7 +245,7 @@ TEST_F(HttpServerTest, ASlowBodyEndsAfterTenSecondsAlsoWhenItDrips) {
 }
 
 TEST_F(HttpServerTest, AnIdleConnectionEndsAfterAMinute) {
-  RawClient client{clock, api->port()};
+  RawClient client{clock, port()};
   client.send(head("GET /api/v1/robots"));
   client.read_until("{\"robots\":[]}");
   clock.run_for(59s);
@@ -255,7 +255,7 @@ TEST_F(HttpServerTest, AnIdleConnectionEndsAfterAMinute) {
 }
 
 TEST_F(HttpServerTest, LetsAWaitingClientContinue) {
-  RawClient client{clock, api->port()};
+  RawClient client{clock, port()};
   client.send(
       head("POST /api/v1/runs", "Content-Type: application/json\r\nContent-Length: 2\r\nExpect: 100-continue\r\n"));
   EXPECT_EQ(client.read_until("\r\n\r\n"), "HTTP/1.1 100 Continue\r\n\r\n");
@@ -354,7 +354,7 @@ TEST_F(HttpServerTest, AnswersOfAllKindsFollowOneAnother) {
   const std::string file = get("/api/v1/openapi.yaml");
   const auto begin = file.find("ETag: ") + 6;
   const std::string etag = file.substr(begin, file.find("\r\n", begin) - begin);
-  RawClient client{clock, api->port()};
+  RawClient client{clock, port()};
   client.send(head("HEAD /api/v1/runs/1/samples.csv") + head("GET /api/v1/runs/1/samples.csv") +
               head("GET /api/v1/openapi.yaml", "If-None-Match: " + etag + "\r\n") + head("GET /live") +
               head("GET /api/v1/robots", "Connection: close\r\n"));
@@ -370,14 +370,14 @@ TEST_F(HttpServerTest, AnswersOfAllKindsFollowOneAnother) {
 
 TEST_F(HttpServerTest, SilentConnectionsDoNotKeepAStopOut) {
   connect_robot();
-  RawClient known{clock, api->port()};  // the oldest, but it has shown the token
+  RawClient known{clock, port()};  // the oldest, but it has shown the token
   known.send(head("GET /api/v1/station"));
   known.read_until("}");
   std::vector<std::unique_ptr<RawClient>> silent;
   for (std::size_t i = 1; i < security.http().limiter.limits().of_loopback + 40; ++i) {
-    silent.push_back(std::make_unique<RawClient>(clock, api->port()));
+    silent.push_back(std::make_unique<RawClient>(clock, port()));
   }
-  RawClient person{clock, api->port()};
+  RawClient person{clock, port()};
   person.send(head("POST /api/v1/robots/r1/emergency-stop"));
   ASSERT_EQ(robot->commands().size(), 1U);
   robot->acknowledge(robot->commands()[0], rheonaut_COMMAND_RESULT_ACCEPTED, 99);
@@ -389,7 +389,7 @@ TEST_F(HttpServerTest, SilentConnectionsDoNotKeepAStopOut) {
 }
 
 TEST_F(HttpServerTest, StopsWithConnectionsOpen) {
-  RawClient client{clock, api->port()};
+  RawClient client{clock, port()};
   client.send("GET / HT");
   tasks.stop();
   clock.settle();

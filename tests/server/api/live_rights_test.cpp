@@ -1,4 +1,5 @@
 // What a page on /live may do, and that it ends with the session or token that it rests on.
+#include "server/identity/accounts.hpp"
 #include "tests/server/api/live_page.hpp"
 
 namespace server {
@@ -12,12 +13,12 @@ class LiveRightsTest : public ApiTest {
     return made.parsed()["secret"];
   }
   std::unique_ptr<Page> open(const std::string& secret) {
-    return std::make_unique<Page>(clock, api->port(), "Authorization: Bearer " + secret + "\r\n");
+    return std::make_unique<Page>(clock, port(), "Authorization: Bearer " + secret + "\r\n");
   }
   std::unique_ptr<Page> open_by_cookie(const std::string& secret) {
-    return std::make_unique<Page>(clock, api->port(), "Cookie: rheonaut_session_fedcba9876543210=" + secret + "\r\n");
+    return std::make_unique<Page>(clock, port(), "Cookie: rheonaut_session_fedcba9876543210=" + secret + "\r\n");
   }
-  std::string make_session(const std::string& user) { return api->accounts().open_session(user, "", ""); }
+  std::string make_session(const std::string& user) { return accounts().open_session(user, "", ""); }
   void add_user(const std::string& name, const std::string& role) {
     const json body{{"name", name}, {"role", role}, {"password", "correct horse"}};
     EXPECT_EQ(ask("POST", "/api/v1/users", body).status, 201);
@@ -96,7 +97,7 @@ TEST_F(LiveRightsTest, ARevokedOrOldTokenEndsItsPages) {
 
   const Answered made = ask("POST", "/api/v1/tokens", {{"name", "b"}, {"scopes", "read"}, {"days", 1}});
   const std::string short_lived = made.parsed()["secret"];
-  std::optional<identity::Caller> caller = api->accounts().caller_of_token(short_lived);
+  std::optional<identity::Caller> caller = accounts().caller_of_token(short_lived);
   ASSERT_TRUE(caller);
   clock.skip(24h - 1min);
   clock.settle();
@@ -153,7 +154,7 @@ TEST_F(LiveRightsTest, SigningOutEndsTheSessionAndItsPages) {
   const std::string secret = make_session("");
   const auto page = open_by_cookie(secret);
   ASSERT_TRUE(page->open());
-  RawClient client{clock, api->port()};
+  RawClient client{clock, port()};
   client.send(
       "POST /api/v1/logout HTTP/1.1\r\nHost: localhost\r\nOrigin: http://localhost\r\nContent-Length: 0\r\n"
       "Connection: close\r\nCookie: rheonaut_session_fedcba9876543210=" +

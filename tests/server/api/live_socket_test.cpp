@@ -1,4 +1,5 @@
 // /live over a real socket, with WebSocket frames made by hand.
+#include "server/live/live_feed.hpp"
 #include "tests/server/api/live_page.hpp"
 
 namespace server {
@@ -8,7 +9,7 @@ class LiveSocketTest : public ApiTest {
  protected:
   std::string bearer() const { return "Authorization: Bearer " + token() + "\r\n"; }
   std::unique_ptr<Page> open_page() {
-    auto page = std::make_unique<Page>(clock, api->port(), bearer());
+    auto page = std::make_unique<Page>(clock, port(), bearer());
     EXPECT_TRUE(page->open()) << page->answer;
     return page;
   }
@@ -32,14 +33,13 @@ TEST_F(LiveSocketTest, WelcomesWithEveryRobotThenSendsWhatHappens) {
 }
 
 TEST_F(LiveSocketTest, NeedsACredentialAndItsOwnOrigin) {
-  EXPECT_TRUE(Page(clock, api->port(), "").answer.starts_with("HTTP/1.1 401"));
-  EXPECT_TRUE(
-      Page(clock, api->port(), bearer() + "Origin: http://evil.example\r\n").answer.starts_with("HTTP/1.1 403"));
-  EXPECT_TRUE(Page(clock, api->port(), bearer() + "Origin: http://localhost\r\n").open());
+  EXPECT_TRUE(Page(clock, port(), "").answer.starts_with("HTTP/1.1 401"));
+  EXPECT_TRUE(Page(clock, port(), bearer() + "Origin: http://evil.example\r\n").answer.starts_with("HTTP/1.1 403"));
+  EXPECT_TRUE(Page(clock, port(), bearer() + "Origin: http://localhost\r\n").open());
 }
 
 TEST_F(LiveSocketTest, SpeaksWebSocketOnly) {
-  RawClient client{clock, api->port()};
+  RawClient client{clock, port()};
   client.send("GET /live HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n" + bearer() + "\r\n");
   EXPECT_TRUE(client.read_to_end().starts_with("HTTP/1.1 426"));
 }

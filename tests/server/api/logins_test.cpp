@@ -1,6 +1,8 @@
 // Signing in with a password, and attempts to guess one.
+#include "server/identity/accounts.hpp"
 #include "server/identity/login_throttle.hpp"
 
+#include "server/identity/logins.hpp"
 #include "tests/server/api/api_fixture.hpp"
 
 namespace server {
@@ -130,7 +132,7 @@ class LoginsTest : public ApiTest {
     const std::string cookie = header(answered, "Set-Cookie");
     return cookie.substr(cookie.find('=') + 1, cookie.find(';') - cookie.find('=') - 1);
   }
-  std::uint64_t hashes() const { return api->logins().hashes_made(); }
+  std::uint64_t hashes() const { return logins().hashes_made(); }
 };
 
 TEST_F(LoginsTest, APasswordOpensASession) {
@@ -141,7 +143,7 @@ TEST_F(LoginsTest, APasswordOpensASession) {
                                {"role", "operator"},
                                {"scopes", "read,stop,record,command"}}));
   EXPECT_TRUE(header(in, "Set-Cookie").starts_with("rheonaut_session_fedcba9876543210="));
-  EXPECT_EQ(api->accounts().caller_of_session(secret_of(in))->actor, "user:anna/session:1");
+  EXPECT_EQ(accounts().caller_of_session(secret_of(in))->actor, "user:anna/session:1");
   EXPECT_EQ(ask("GET", "/api/v1/sessions").parsed()["sessions"][0]["peer"], "127.0.0.1");
   EXPECT_EQ(in.body.find(secret_of(in)), std::string::npos) << "no script of the page sees it";
 }
@@ -185,9 +187,9 @@ TEST_F(LoginsTest, TenThousandBadLoginsCostAFewHashesAndSignNobodyOut) {
   }
   EXPECT_EQ(statuses[401] + statuses[429], 10'000);
   EXPECT_LE(hashes() - before, static_cast<std::uint64_t>(identity::LoginThrottle::kFreeOfAddress));
-  EXPECT_EQ(api->accounts().sessions().size(), 1U);
+  EXPECT_EQ(accounts().sessions().size(), 1U);
   // Who is signed in goes on, and stops.
-  scopes = api->accounts().caller_of_session(secret_of(in))->scopes;
+  scopes = accounts().caller_of_session(secret_of(in))->scopes;
   connect_robot();
   auto stopping = begin("POST", "/api/v1/robots/r1/emergency-stop");
   ASSERT_TRUE(clock.run_until([&] { return !robot->commands().empty(); }, 1s));
@@ -211,7 +213,7 @@ TEST_F(LoginsTest, FewWaitAtATimeAndFewerOfOneAddress) {
     identity::LoginAttempt attempt{std::move(name), "guess", asking.peer, ""};
     asking.end = co_await logins.log_in(std::move(attempt));
   };
-  identity::Logins logins{clock, api->accounts(), kCheapPasswords};
+  identity::Logins logins{clock, accounts(), kCheapPasswords};
   clock.add_worker(logins.worker());
   for (std::size_t i = 0; i < all.size(); ++i) {
     tasks.spawn("attempt", attempt(logins, all[i], "user" + std::to_string(i)));
@@ -232,23 +234,23 @@ TEST_F(LoginsTest, FewWaitAtATimeAndFewerOfOneAddress) {
 }
 
 TEST_F(LoginsTest, EachUserHasAFewSessionsAndTakesNobodyElsesPlace) {
-  const std::string of_link = api->accounts().open_session("", "", "");
+  const std::string of_link = accounts().open_session("", "", "");
   std::vector<std::string> secrets;
   for (std::size_t i = 0; i <= identity::kMaxSessionsOfUser; ++i) {
     secrets.push_back(secret_of(log_in("anna", "correct horse")));
     clock.run_for(1s);
   }
-  EXPECT_FALSE(api->accounts().caller_of_session(secrets.front()));
-  EXPECT_TRUE(api->accounts().caller_of_session(secrets.back()));
-  EXPECT_TRUE(api->accounts().caller_of_session(of_link));
+  EXPECT_FALSE(accounts().caller_of_session(secrets.front()));
+  EXPECT_TRUE(accounts().caller_of_session(secrets.back()));
+  EXPECT_TRUE(accounts().caller_of_session(of_link));
 }
 
 TEST_F(LoginsTest, ANewPasswordEndsTheSessionsAndTheOldPassword) {
   const std::string secret = secret_of(log_in("anna", "correct horse"));
   EXPECT_EQ(ask("POST", "/api/v1/users/anna/change", {{"password", "short"}}).status, 422);
-  EXPECT_TRUE(api->accounts().caller_of_session(secret));
+  EXPECT_TRUE(accounts().caller_of_session(secret));
   EXPECT_EQ(ask("POST", "/api/v1/users/anna/change", {{"password", "battery staple"}}).status, 200);
-  EXPECT_FALSE(api->accounts().caller_of_session(secret));
+  EXPECT_FALSE(accounts().caller_of_session(secret));
   EXPECT_EQ(log_in("anna", "correct horse").status, 401);
   EXPECT_EQ(log_in("anna", "battery staple").status, 200);
 }

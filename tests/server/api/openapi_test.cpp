@@ -4,6 +4,7 @@
 #include <fstream>
 #include <set>
 
+#include "server/http/router.hpp"
 #include "tests/server/api/api_fixture.hpp"
 #include "tests/server/api/openapi_document.hpp"
 
@@ -42,28 +43,28 @@ TEST_F(OpenapiTest, EveryRouteIsDocumentedAndEveryDocumentedRouteExists) {
   const Operations document = documented();
   std::set<std::string> described, registered;
   for (const auto& [operation, details] : document) described.insert(operation);
-  for (const http::Route& route : api->router().routes()) registered.insert(route.method + " " + route.pattern);
+  for (const http::Route& route : router().routes()) registered.insert(route.method + " " + route.pattern);
   EXPECT_EQ(described, registered);
   EXPECT_GE(described.size(), 18U);
 }
 
 TEST_F(OpenapiTest, QueryParametersAreTheSame) {
   const Operations document = documented();
-  for (const http::Route& route : api->router().routes()) {
+  for (const http::Route& route : router().routes()) {
     const std::string operation = route.method + " " + route.pattern;
     const std::set<std::string> known{route.query.begin(), route.query.end()};
     EXPECT_EQ(document.at(operation).query, known) << operation;
   }
-  EXPECT_FALSE(api->router().routes().empty());
+  EXPECT_FALSE(router().routes().empty());
 }
 
 TEST_F(OpenapiTest, EveryRouteNeedsWhatTheDocumentSays) {
   const Operations document = documented();
-  for (const http::Route& route : api->router().routes()) {
+  for (const http::Route& route : router().routes()) {
     const std::string operation = route.method + " " + route.pattern;
     EXPECT_EQ(document.at(operation).scope, text(route.needs)) << operation;
   }
-  EXPECT_FALSE(api->router().routes().empty());
+  EXPECT_FALSE(router().routes().empty());
 }
 
 // Every example of docs/api.md calls a route that exists, and its JSON is JSON.

@@ -5,6 +5,7 @@
 #include <functional>
 #include <set>
 
+#include "server/http/router.hpp"
 #include "tests/server/api/api_fixture.hpp"
 #include "tests/server/api/openapi_document.hpp"
 
@@ -189,7 +190,7 @@ TEST_F(PagesTest, EveryRouteWithALimitIsOneOfThemInOneStyle) {
   for (const List& list : lists) walked[list.pattern] = list.cursor;
   const json document = openapi_document();
   std::size_t found = 0;
-  for (const http::Route& route : api->router().routes()) {
+  for (const http::Route& route : router().routes()) {
     if (std::ranges::find(route.query, "limit") == route.query.end()) continue;
     ++found;
     const std::string cursor = walked[route.pattern];

@@ -156,7 +156,7 @@ TEST_F(RecordingRoutesTest, MetricsAreTextWithHelpAndTypeAndNeedACredential) {
                                       "rheonaut_samples_written_total 20\n"));
   EXPECT_THAT(metrics.body, HasSubstr("# HELP rheonaut_free_bytes "));
 
-  RawClient unauthenticated{clock, api->port()};
+  RawClient unauthenticated{clock, port()};
   unauthenticated.send("GET /metrics HTTP/1.1\r\nHost: localhost\r\n\r\n");
   EXPECT_THAT(unauthenticated.read_until("\r\n"), HasSubstr("401"));
 }

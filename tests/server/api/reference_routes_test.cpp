@@ -185,7 +185,7 @@ TEST_F(ReferenceRoutesTest, OnlyThisRouteTakesALongBody) {
   const std::string text = body(60'000).dump();
   ASSERT_GT(text.size(), 1'000'000U);
   const auto send = [&](const std::string& target, std::size_t length, const std::string& bytes) {
-    RawClient client{clock, api->port()};
+    RawClient client{clock, port()};
     client.send(
         fmt::format("POST {} HTTP/1.1\r\nHost: localhost\r\nAuthorization: Bearer {}\r\nConnection: close\r\n"
                     "Content-Type: application/json\r\nContent-Length: {}\r\n\r\n",
@@ -197,7 +197,7 @@ TEST_F(ReferenceRoutesTest, OnlyThisRouteTakesALongBody) {
   EXPECT_THAT(send("/api/v1/runs/1/annotate", text.size(), ""), ::testing::StartsWith("HTTP/1.1 413 "));
   EXPECT_THAT(send(kPath, 17U << 20U, ""), ::testing::StartsWith("HTTP/1.1 413 "));
   const json viewer = ask("POST", "/api/v1/tokens", {{"name", "v"}, {"scopes", "read"}}).parsed();
-  RawClient client{clock, api->port()};
+  RawClient client{clock, port()};
   client.send(
       fmt::format("POST {} HTTP/1.1\r\nHost: localhost\r\nAuthorization: Bearer {}\r\n"
                   "Content-Type: application/json\r\nContent-Length: {}\r\n\r\n",

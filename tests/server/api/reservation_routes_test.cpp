@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 
+#include "server/identity/accounts.hpp"
 #include "tests/server/api/api_fixture.hpp"
 
 namespace server {
@@ -32,7 +33,7 @@ class ReservationRoutesTest : public ApiTest {
   }
   boost::asio::awaitable<void> made_token(identity::TokenRequest request, bool& is_made) {
     station::Author by{"token:local", "", clock.utc_us()};
-    const auto made = co_await api->accounts().add_token(std::move(request), std::move(by));
+    const auto made = co_await accounts().add_token(std::move(request), std::move(by));
     is_made = made.has_value();
   }
   void add_user(const char* name) {
@@ -123,7 +124,7 @@ TEST_F(ReservationRoutesTest, ATokenOfAUserCountsAsTheUser) {
   add_user("anna");
   add_token("annas", "anna");
   add_token("lab", "");
-  const identity::Accounts& accounts = api->accounts();
+  const identity::Accounts& accounts = ApiTest::accounts();
   EXPECT_EQ(accounts.account_of("token:annas"), "user:anna");
   EXPECT_EQ(accounts.account_of("token:lab"), "token:lab");
   EXPECT_EQ(accounts.account_of("user:anna/session:4"), "user:anna");

@@ -1,6 +1,8 @@
 // Every route under every role and scope: who may do what, and the answers to those who may not.
 #include <set>
 
+#include "server/http/router.hpp"
+#include "server/identity/accounts.hpp"
 #include "tests/server/api/api_fixture.hpp"
 
 namespace server {
@@ -31,7 +33,7 @@ TEST_F(RightsTest, EveryRouteIsOpenToTheRolesThatItsScopeNamesAndToNoOther) {
   std::map<std::string, int> open;
   for (const identity::Role role : identity::kRoles) {
     scopes = identity::Scopes::of(role);
-    for (const http::Route& route : api->router().routes()) {
+    for (const http::Route& route : router().routes()) {
       const bool may = role >= least_role(route.needs);
       EXPECT_EQ(refused(route), !may) << text(role) << ": " << route.method << " " << route.pattern;
       open[text(role)] += may ? 1 : 0;
@@ -45,7 +47,7 @@ TEST_F(RightsTest, EveryRouteIsOpenToTheRolesThatItsScopeNamesAndToNoOther) {
 TEST_F(RightsTest, WithoutACredentialOnlySigningInAndHealthAreThere) {
   scopes = {};
   std::set<std::string> open;
-  for (const http::Route& route : api->router().routes()) {
+  for (const http::Route& route : router().routes()) {
     if (!refused(route)) open.insert(route.method + " " + route.pattern);
   }
   EXPECT_EQ(open,
@@ -56,7 +58,7 @@ TEST_F(RightsTest, WithoutACredentialOnlySigningInAndHealthAreThere) {
 // Written out, so that a route that changes its scope by accident is noticed here.
 TEST_F(RightsTest, AViewerChangesNothingButMayStop) {
   std::set<std::string> changes;
-  for (const http::Route& route : api->router().routes()) {
+  for (const http::Route& route : router().routes()) {
     if (route.method != "GET" && least_role(route.needs) == identity::Role::viewer) changes.insert(route.pattern);
   }
   EXPECT_EQ(changes,
@@ -64,7 +66,7 @@ TEST_F(RightsTest, AViewerChangesNothingButMayStop) {
                                    "/api/v1/experiments/{experiment_id}/pause", "/api/v1/foxglove-links",
                                    "/api/v1/robots/{robot_id}/emergency-stop", "/api/v1/login", "/api/v1/logout"}));
   std::set<std::string> of_admins;
-  for (const http::Route& route : api->router().routes()) {
+  for (const http::Route& route : router().routes()) {
     if (route.needs == identity::Scope::admin) of_admins.insert(route.method + " " + route.pattern);
   }
   EXPECT_TRUE(of_admins.contains("POST /api/v1/login-links")) << "a link signs in as admin";
@@ -150,7 +152,7 @@ TEST_F(RightsTest, ATokenThatMayOnlyStopSeesWhatItsStopIsAboutAndNothingElse) {
   const auto stopping = begin("POST", "/api/v1/robots/r1/emergency-stop");
   scopes = identity::parse_scopes("stop").value();
   std::set<std::string> open;
-  for (const http::Route& route : api->router().routes()) {
+  for (const http::Route& route : router().routes()) {
     if (route.needs != identity::Scope::anyone && !refused(route)) open.insert(route.method + " " + route.pattern);
   }
   EXPECT_EQ(open,
@@ -234,7 +236,7 @@ TEST_F(RightsTest, EachScopeBringsAlongWhatItMust) {
 }
 
 TEST_F(RightsTest, ATokenOfAUserIsBoundByTheUsersRole) {
-  identity::Accounts& accounts = api->accounts();
+  identity::Accounts& accounts = ApiTest::accounts();
   std::optional<Result<identity::User>> added;
   std::optional<Result<identity::NewToken>> made;
   const auto make = [](identity::Accounts& in, std::optional<Result<identity::User>>& user,

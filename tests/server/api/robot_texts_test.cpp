@@ -169,7 +169,7 @@ int stage_of(const json& state) {
 
 TEST_F(OpeningPageTest, NothingIsLostBetweenTheWelcomeAndTheFirstChangeAndNothingGoesBack) {
   station.restore(fleet_of(kFleet), {});
-  Page page{clock, api->port(), bearer(), "127.0.0.1", [&] { tasks.spawn("changes", change_everything()); }};
+  Page page{clock, port(), bearer(), "127.0.0.1", [&] { tasks.spawn("changes", change_everything()); }};
   ASSERT_TRUE(page.open()) << page.answer;
   const json welcome = page.receive("welcome");
   ASSERT_TRUE(has_changed);
@@ -203,7 +203,7 @@ TEST_F(OpeningPageTest, TheListOfAFleetIsOneDocumentInPieces) {
   const Answered answered = ask("GET", "/api/v1/robots");
   EXPECT_NE(answered.response.stream, nullptr);
   EXPECT_EQ(answered.parsed()["robots"].size(), kFleet);
-  RawClient client{clock, api->port()};
+  RawClient client{clock, port()};
   client.send("GET /api/v1/robots HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n" + bearer() + "\r\n");
   const std::string head = client.read_until("\r\n\r\n");
   EXPECT_TRUE(head.starts_with("HTTP/1.1 200")) << head;

@@ -3,6 +3,8 @@
 
 #include <ctime>
 
+#include "server/http/router.hpp"
+#include "server/live/live_feed.hpp"
 #include "tests/server/api/api_fixture.hpp"
 
 namespace server {
@@ -26,7 +28,7 @@ TEST_F(RoutesTest, StationSaysWhatItIs) {
   const json station_json = ask("GET", "/api/v1/station").parsed();
   EXPECT_EQ(station_json["version"], "0.1.0");
   EXPECT_EQ(station_json["store_id"], "18364758544493064720");
-  EXPECT_EQ(station_json["http_address"], "127.0.0.1:" + std::to_string(api->port()));
+  EXPECT_EQ(station_json["http_address"], "127.0.0.1:" + std::to_string(port()));
   EXPECT_GE(station_json["uptime_s"], 2.0);
 }
 
@@ -310,7 +312,7 @@ TEST_F(RoutesTest, TheTextOfManySamplesIsNotMadeOnTheLoop) {
   for (std::uint64_t seq = 0; seq < 10'000; seq += 25) make_samples(*robot, seq, 25);
   const auto longest_us = [&](const char* target, std::string& text) {
     std::optional<std::string> answer;
-    tasks.spawn("fetch", fetch(api->router(), target, answer));
+    tasks.spawn("fetch", fetch(router(), target, answer));
     std::int64_t longest = 0;
     const auto patience = std::chrono::steady_clock::now() + 60s;
     while (!answer && std::chrono::steady_clock::now() < patience) {

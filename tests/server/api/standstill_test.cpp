@@ -49,7 +49,7 @@ class StandstillTest : public ApiTest {
   }
   std::string holder() const { return station.find("r1")->control.holder; }
 
-  RawClient client{clock, api->port()};
+  RawClient client{clock, port()};
   std::string status;  // of the latest answer
 };
 
@@ -136,7 +136,7 @@ TEST_F(StandstillTest, ALoopThatIsMerelyBusyRefusesNothing) {
 
 TEST_F(StandstillTest, APageThatSpokeBeforeKeepsNothingByIt) {
   tasks.spawn("control", station.watch_control());
-  Page page{clock, api->port(), "Authorization: Bearer " + token() + "\r\n"};
+  Page page{clock, port(), "Authorization: Bearer " + token() + "\r\n"};
   ASSERT_TRUE(page.open());
   expect_sent(set_duty(500));
   const auto say_during = [&](microseconds standstill, json message) {

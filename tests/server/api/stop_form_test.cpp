@@ -1,6 +1,7 @@
 // An emergency stop over a real socket, in every form that a program may give it: only who asks, and from where, is
 // judged.
 #include "server/http/http_connection.hpp"
+#include "server/identity/accounts.hpp"
 #include "tests/server/api/api_fixture.hpp"
 
 namespace server {
@@ -15,7 +16,7 @@ class StopFormTest : public ApiTest {
 
   std::string bearer() const { return "Authorization: Bearer " + token() + "\r\n"; }
   std::string cookie() {
-    const std::string secret = api->accounts().open_session("", "127.0.0.1", "");
+    const std::string secret = accounts().open_session("", "127.0.0.1", "");
     return "Cookie: rheonaut_session_fedcba9876543210=" + secret + "\r\n";
   }
   static std::string post(const std::string& target, const std::string& headers) {
@@ -37,13 +38,13 @@ class StopFormTest : public ApiTest {
     body_ = client.read_exactly(std::stoul(head_.substr(length)));
   }
   void expect_stop(const std::string& request) {
-    RawClient client{clock, api->port()};
+    RawClient client{clock, port()};
     expect_stop(client, request);
   }
   // Nothing reaches the robot.
   void expect_refused(const std::string& request, const std::string& status) {
     const std::size_t before = stops();
-    RawClient client{clock, api->port()};
+    RawClient client{clock, port()};
     client.send(request);
     const std::string answer = client.read_until("\r\n");
     EXPECT_TRUE(answer.starts_with("HTTP/1.1 " + status + " ")) << request << answer;
@@ -105,7 +106,7 @@ TEST_F(StopFormTest, AHeadOf15kBIsObeyedAndOneOfMoreThan16kBRefusedInWords) {
     return post(kStop, bearer() + "X-Long: " + std::string(bytes - others, 'x') + "\r\n");
   };
   expect_stop(head_of(15 * 1024));
-  RawClient client{clock, api->port()};
+  RawClient client{clock, port()};
   client.send(head_of(http::kMaxHeaderBytes + 1024));
   const std::string answer = client.read_until("bytes");
   EXPECT_TRUE(answer.starts_with("HTTP/1.1 431 ")) << answer;
@@ -114,7 +115,7 @@ TEST_F(StopFormTest, AHeadOf15kBIsObeyedAndOneOfMoreThan16kBRefusedInWords) {
 }
 
 TEST_F(StopFormTest, ActsBeforeTheBodyHasArrived) {
-  RawClient client{clock, api->port()};
+  RawClient client{clock, port()};
   expect_stop(client, post(kStop, bearer() + "Content-Length: 10\r\n"));
   EXPECT_FALSE(closes());
   client.send("0123456789");
@@ -123,7 +124,7 @@ TEST_F(StopFormTest, ActsBeforeTheBodyHasArrived) {
 
 TEST_F(StopFormTest, DoesNotWaitForABodyThatNeverComes) {
   for (const char* body : {"Content-Length: 10\r\n", "Transfer-Encoding: chunked\r\n"}) {
-    RawClient client{clock, api->port()};
+    RawClient client{clock, port()};
     expect_stop(client, post(kStop, bearer() + body) + "5\r\nabc");
     clock.run_for(http::kRequestTime + 2s);
     EXPECT_TRUE(client.closed()) << "and nothing is said twice";
@@ -131,14 +132,14 @@ TEST_F(StopFormTest, DoesNotWaitForABodyThatNeverComes) {
 }
 
 TEST_F(StopFormTest, AChunkedBodyIsPassedOver) {
-  RawClient client{clock, api->port()};
+  RawClient client{clock, port()};
   expect_stop(client, post(kStop, bearer() + "Transfer-Encoding: chunked\r\n") + "5\r\nab");
   client.send("cde\r\n3;x=y\r\nfgh\r\n0\r\nTrailer: x\r\n\r\n");
   expect_stop(client, post(kStop, bearer()));
 }
 
 TEST_F(StopFormTest, AfterALargeBodyTheConnectionEnds) {
-  RawClient client{clock, api->port()};
+  RawClient client{clock, port()};
   expect_stop(client, post(kStop, bearer() + "Content-Length: 100000\r\n") + std::string(30'000, 'x'));
   EXPECT_TRUE(closes());
   EXPECT_TRUE(json::parse(body_).contains("command_id")) << body_;
@@ -147,7 +148,7 @@ TEST_F(StopFormTest, AfterALargeBodyTheConnectionEnds) {
 }
 
 TEST_F(StopFormTest, AChunkedBodyThatGrowsTooLargeEndsTheConnection) {
-  RawClient client{clock, api->port()};
+  RawClient client{clock, port()};
   expect_stop(client, post(kStop, bearer() + "Transfer-Encoding: chunked\r\n"));
   client.send("20000\r\n" + std::string(0x20000, 'x') + "\r\n0\r\n\r\n" + post(kStop, bearer()));
   clock.run_for(http::kLingerTime + 2s);
@@ -158,7 +159,7 @@ TEST_F(StopFormTest, AChunkedBodyThatGrowsTooLargeEndsTheConnection) {
 // curl asks first when its body is large. Told what became of the stop, it may send the body or not: so nothing after
 // the answer is taken for a request.
 TEST_F(StopFormTest, IsNotHeldUpByAClientThatAsksWhetherItMaySend) {
-  RawClient client{clock, api->port()};
+  RawClient client{clock, port()};
   expect_stop(client, post(kStop, bearer() + "Expect: 100-continue\r\nContent-Length: 2000\r\n"));
   EXPECT_TRUE(closes());
   client.send(post(kStop, bearer()));
@@ -171,14 +172,14 @@ TEST_F(StopFormTest, IsNotHeldUpByAClientThatAsksWhetherItMaySend) {
 TEST_F(StopFormTest, ARequestInABodyIsNotCarriedOut) {
   const std::string hidden = post("/api/v1/robots/r1/emergency-stop", bearer());
   const std::string length = "Content-Length: " + std::to_string(hidden.size()) + "\r\n";
-  RawClient whole{clock, api->port()};
+  RawClient whole{clock, port()};
   expect_stop(whole, post(kStop, bearer() + length) + hidden);
   EXPECT_EQ(stops(), 1U);
-  RawClient later{clock, api->port()};
+  RawClient later{clock, port()};
   expect_stop(later, post(kStop, bearer() + length));
   later.send(hidden);
   EXPECT_EQ(stops(), 2U);
-  RawClient large{clock, api->port()};
+  RawClient large{clock, port()};
   expect_stop(large, post(kStop, bearer() + "Content-Length: 100000\r\n"));
   large.send(hidden);
   EXPECT_EQ(stops(), 3U);
@@ -233,7 +234,7 @@ TEST_F(StopFormTest, ByATokenItNeedsNoOriginButNotAnothers) {
 
 TEST_F(StopFormTest, AKeyStillMakesTwoRequestsOneStop) {
   const std::string request = post(kStop, bearer() + "Idempotency-Key: press-1\r\nContent-Length: 2\r\n") + "{}";
-  RawClient client{clock, api->port()};
+  RawClient client{clock, port()};
   expect_stop(client, request);
   const std::string first = json::parse(body_)["command_id"];
   client.send(request);

@@ -18,7 +18,7 @@ class TrailersTest : public ApiTest {
   }
   // The answer, and whether another request on the same connection is answered.
   std::pair<std::string, bool> answer_and_next(const std::string& request) {
-    RawClient client{clock, api->port()};
+    RawClient client{clock, port()};
     client.send(request);
     const std::string answer = client.read_until("\r\n\r\n");
     client.send("GET /api/v1/station HTTP/1.1\r\nHost: localhost\r\n" + bearer() + "Connection: close\r\n\r\n");
@@ -63,7 +63,7 @@ TEST_F(TrailersTest, AnUpgradeInTrailersIsNone) {
   const std::string upgrade =
       "Connection: upgrade\r\nUpgrade: websocket\r\nSec-WebSocket-Version: 13\r\n"
       "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n";
-  RawClient client{clock, api->port()};
+  RawClient client{clock, port()};
   client.send(head("GET /live", bearer()) + chunked("", upgrade).substr(std::string_view{"0\r\n\r\n"}.size()));
   const std::string answer = client.read_until("\r\n\r\n");
   EXPECT_TRUE(answer.starts_with("HTTP/1.1 4")) << answer;

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "server/link/robot_listener.hpp"
 #include "tests/server/link/test_robot.hpp"
 
 namespace server {

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "server/link/robot_listener.hpp"
 #include "tests/server/stream_reader.hpp"
 
 namespace server {

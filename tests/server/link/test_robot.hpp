@@ -5,8 +5,15 @@
 #include <memory>
 #include <vector>
 
-#include "server/link/robot_listener.hpp"
+#include "server/net/byte_stream.hpp"
+#include "server/runtime/tasks.hpp"
+#include "server/station/state/robot_archive.hpp"
+#include "server/station/state/station_sink.hpp"
 #include "tests/server/virtual_clock.hpp"
+
+namespace server::link {
+class RobotListener;
+}  // namespace server::link
 
 namespace server {
 
