@@ -86,10 +86,7 @@ class Tree:
 
     def _add_programs(self, listing):
         text = re.sub(r"#[^\n]*", "", listing.read_text(encoding="utf-8"))
-        found = re.findall(r"rheonaut_test\((\w+)([^)]*)\)", text)
-        found += [(f"{name}_fuzz_replay", rest) for name, rest in
-                  re.findall(r"add_library\((\w+)_fuzz_target OBJECT([^)]*)\)", text)]
-        for name, rest in found:
+        for name, rest in re.findall(r"rheonaut_test\((\w+)([^)]*)\)", text):
             sources = re.findall(r"\S+\.(?:cpp|ino)\b", rest.replace("${PROJECT_SOURCE_DIR}", str(self.root)))
             sources = [(listing.parent / source).resolve().relative_to(self.root.resolve()).as_posix() for source in sources]
             units = {node_of(source) for source in sources}
@@ -174,8 +171,6 @@ def reached(root, changed):
             lines.add(f"program {program}")
         if any(path.endswith("CMakeLists.txt") and tree.root / path == tree.listings[program] for path in changed):
             lines.add(f"program {program}")
-        if any(path.startswith(f"tests/data/fuzz/{program.removesuffix('_fuzz_replay')}/") for path in changed):
-            lines.add(f"program {program}")
     lines |= {name if " " in name else f"test {name}" for name in process_tests(tree, changed, nodes, others)}
     if any(path.startswith("web/") or path == "server/api/openapi.yaml" for path in changed):
         lines.add("test web_.*")
@@ -202,8 +197,7 @@ def is_part(path, test, script):
 
 
 def is_named(tree, path):
-    return path.startswith("tests/data/fuzz/") or any(name in tree.named_by(program) for program in tree.programs
-                                                      for name in names_of(path))
+    return any(name in tree.named_by(program) for program in tree.programs for name in names_of(path))
 
 
 def process_tests(tree, changed, nodes, others):

@@ -28,7 +28,8 @@ SMALL_TREE = {
     "tests/server/words.cpp": '#include "words.hpp"\nread("docs/page.md");\n',
     "tests/sim_robot/CMakeLists.txt": "rheonaut_test(world_test\n  SOURCES\n    world_test.cpp)\n",
     "tests/sim_robot/world_test.cpp": '#include "sim_robot/world/world.hpp"\n',
-    "tests/fuzz/CMakeLists.txt": "add_library(frame_fuzz_target OBJECT frame_fuzz.cpp)\n",
+    "tests/fuzz/CMakeLists.txt": "rheonaut_test(corpora_test\n  SOURCES\n    corpora_test.cpp\n    frame_fuzz.cpp)\n",
+    "tests/fuzz/corpora_test.cpp": 'replay(TEST_DATA_DIR "/fuzz/" + name);\n',
     "tests/fuzz/frame_fuzz.cpp": '#include "protocol/frame.hpp"\n',
     "tests/system/processes.py": "",
     "tests/system/kill_test.py": "from processes import lab\n",
@@ -74,7 +75,7 @@ class ReachTest(unittest.TestCase):
                     {"program world_test", "test rheonaut_sim_.*", "lx106", "test esp8266_check"} | PROCESSES)
 
     def test_what_all_stand_on_reaches_all_that_include_it(self):
-        self.expect("protocol/robot.proto", {"test docs_not_yet", "program net_test", "program page_test", "program frame_fuzz_replay", "lx106",
+        self.expect("protocol/robot.proto", {"test docs_not_yet", "program net_test", "program page_test", "program corpora_test", "lx106",
                                              "test esp8266_check", "test golden_frames_by_protoc"} | PROCESSES)
 
     def test_a_test_reaches_itself_and_its_words_all_that_use_them(self):
@@ -86,7 +87,7 @@ class ReachTest(unittest.TestCase):
         self.expect("docs/page.md", {"program page_test", "test docs_commands", "test docs_not_yet"})
         self.expect("docs/other.md", {"test docs_commands", "test docs_not_yet"})
         self.expect("tests/data/listener_cases.json", {"program net_test"})
-        self.expect("tests/data/fuzz/frame/1", {"program frame_fuzz_replay"})
+        self.expect("tests/data/fuzz/frame/1", {"program corpora_test"})
 
     def test_what_the_documents_are_compared_with_reaches_their_checks(self):
         for path in ("server/cli/user.cpp", "sim_robot/cli/options.hpp", "server/api/openapi.yaml", "protocol/robot.proto"):
@@ -95,7 +96,7 @@ class ReachTest(unittest.TestCase):
 
     def test_data_that_nobody_names_reaches_every_program(self):
         self.expect("tests/data/new.json", {"program net_test", "program page_test", "program world_test",
-                                            "program frame_fuzz_replay"})
+                                            "program corpora_test"})
 
     def test_a_script_reaches_itself_and_those_that_import_it(self):
         self.expect("tests/system/kill_test.py", {"test system_kill"})

@@ -11,6 +11,7 @@
 #include "server/identity/accounts.hpp"
 #include "server/live/live_feed.hpp"
 #include "server/live/robot_texts.hpp"
+#include "tests/fuzz/targets.hpp"
 #include "tests/server/api/api_fixture.hpp"
 
 namespace server {
@@ -125,8 +126,7 @@ void send(const std::string& text) {
 }  // namespace
 }  // namespace server
 
-// The name and the signature that libFuzzer calls.
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {  // NOLINT
+int fuzz::body(const std::uint8_t* data, std::size_t size) {
   server::send({reinterpret_cast<const char*>(data), size});
   return 0;
 }

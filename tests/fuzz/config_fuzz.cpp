@@ -8,6 +8,7 @@
 
 #include "server/config/config.hpp"
 #include "server/config/station_document.hpp"
+#include "tests/fuzz/targets.hpp"
 
 namespace server {
 namespace {
@@ -52,8 +53,7 @@ void read(const std::string& text) {
 }  // namespace
 }  // namespace server
 
-// The name and the signature that libFuzzer calls.
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {  // NOLINT
+int fuzz::config(const std::uint8_t* data, std::size_t size) {
   server::read({reinterpret_cast<const char*>(data), size});
   return 0;
 }

@@ -13,6 +13,7 @@
 
 #include "server/http/request_guard.hpp"
 #include "server/http/router.hpp"
+#include "tests/fuzz/targets.hpp"
 #include "tests/server/virtual_clock.hpp"
 
 namespace server {
@@ -110,8 +111,7 @@ void knock(const std::string& text) {
 }  // namespace
 }  // namespace server
 
-// The name and the signature that libFuzzer calls.
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {  // NOLINT
+int fuzz::cookie(const std::uint8_t* data, std::size_t size) {
   server::knock({reinterpret_cast<const char*>(data), size});
   return 0;
 }

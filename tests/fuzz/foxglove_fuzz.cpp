@@ -7,6 +7,7 @@
 #include <sstream>
 
 #include "server/live/foxglove/feed.hpp"
+#include "tests/fuzz/targets.hpp"
 #include "tests/server/virtual_clock.hpp"
 
 namespace server {
@@ -64,8 +65,7 @@ void talk(const std::string& text) {
 }  // namespace
 }  // namespace server
 
-// The name and the signature that libFuzzer calls.
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {  // NOLINT
+int fuzz::foxglove(const std::uint8_t* data, std::size_t size) {
   server::talk({reinterpret_cast<const char*>(data), size});
   return 0;
 }

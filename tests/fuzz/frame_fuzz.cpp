@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "protocol/frame.hpp"
+#include "tests/fuzz/targets.hpp"
 
 namespace protocol {
 namespace {
@@ -29,8 +30,7 @@ void decode_twice(Bytes payload, Decode decode_frame) {
 }  // namespace
 }  // namespace protocol
 
-// The name and the signature that libFuzzer calls.
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {  // NOLINT
+int fuzz::frame(const std::uint8_t* data, std::size_t size) {
   protocol::FrameReader reader;
   protocol::Bytes input{data, size};
   while (!input.empty()) {

@@ -7,6 +7,7 @@
 
 #include "server/experiments/profile_document.hpp"
 #include "server/experiments/time_line.hpp"
+#include "tests/fuzz/targets.hpp"
 
 namespace server::experiments {
 namespace {
@@ -51,8 +52,7 @@ void read(std::string_view text) {
 }  // namespace
 }  // namespace server::experiments
 
-// The name and the signature that libFuzzer calls.
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {  // NOLINT
+int fuzz::profile(const std::uint8_t* data, std::size_t size) {
   server::experiments::read({reinterpret_cast<const char*>(data), size});
   return 0;
 }

@@ -9,6 +9,7 @@
 #include "server/api/bodies/query_params.hpp"
 #include "server/api/routes/routes.hpp"
 #include "server/runtime/tasks.hpp"
+#include "tests/fuzz/targets.hpp"
 
 namespace server {
 namespace {
@@ -127,8 +128,7 @@ void ask(const std::string& target) {
 }  // namespace
 }  // namespace server
 
-// The name and the signature that libFuzzer calls.
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {  // NOLINT
+int fuzz::query(const std::uint8_t* data, std::size_t size) {
   const std::string text{reinterpret_cast<const char*>(data), size};
   server::decode(text);
   server::read_target(text);

@@ -8,6 +8,7 @@
 #include <memory>
 
 #include "tests/fuzz/station_frames.hpp"
+#include "tests/fuzz/targets.hpp"
 #include "tests/fuzz/watched_robot.hpp"
 #include "tests/robot_fw/memory_storage.hpp"
 
@@ -162,8 +163,7 @@ class Session {
 }  // namespace
 }  // namespace fuzz
 
-// The name and the signature that libFuzzer calls.
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {  // NOLINT
+int fuzz::robot(const std::uint8_t* data, std::size_t size) {
   fuzz::Session{fuzz::ByteSource{{data, size}}}.run();
   return 0;
 }

@@ -5,6 +5,7 @@
 #include <string_view>
 
 #include "sim_robot/lab/scenario_run.hpp"
+#include "tests/fuzz/targets.hpp"
 
 namespace sim_robot {
 namespace {
@@ -44,8 +45,7 @@ void read_fault(std::string_view text) {
 }  // namespace
 }  // namespace sim_robot
 
-// The name and the signature that libFuzzer calls.
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {  // NOLINT
+int fuzz::scenario(const std::uint8_t* data, std::size_t size) {
   const std::string_view text{reinterpret_cast<const char*>(data), size};
   sim_robot::read_scenario(text);
   sim_robot::read_fault(text);
