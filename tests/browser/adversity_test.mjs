@@ -1,7 +1,7 @@
 // Two pages that fight for one robot, every way in which a hand leaves a held control, a tab that is closed under it, and a
 // page that slept: whatever happens, one commands at a time, a duty ends, and nothing that was held is sent afterwards.
 import assert from 'node:assert/strict';
-import { clear_by_script, held as held_by, hold_by_mouse, live, mode_of as mode, samples, sign_in as sign_in_by } from './hands.mjs';
+import { clear_by_script, click_if_offered, held as held_by, hold_by_mouse, live, mode_of as mode, samples, sign_in as sign_in_by } from './hands.mjs';
 import { Bench, until } from './programs.mjs';
 
 const kRobot = 'rheo-1';
@@ -42,7 +42,7 @@ async function at_rest(page) {
   await rests('at the beginning');
   await until('nobody is in control', async () => {
     if ((await holder()) === '') return true;
-    await page.click('#release-control', { timeout: 500 }).catch(() => undefined);
+    await click_if_offered(page, '#release-control');
     return false;
   });
   await live(page);
@@ -144,7 +144,7 @@ const steps = {
     await sign_in(ben, 'ben');
     for (const setpoint_mm of [20, 30]) {
       await until('one of them has it', async () => {
-        await Promise.all([anna, ben].map((page) => page.click('#take-control', { timeout: 1000 }).catch(() => undefined)));
+        await Promise.all([anna, ben].map((page) => click_if_offered(page, '#take-control')));
         return (await holder()) !== '';
       });
       const winner = (await holder()).includes('anna') ? 'anna' : 'ben';
@@ -155,7 +155,7 @@ const steps = {
       await agree('');
     }
     await until('manual', async () => {
-      await anna.click('#to-manual', { timeout: 1000 }).catch(() => undefined);
+      await click_if_offered(anna, '#to-manual');
       return (await mode(anna)) === 'manual';
     });
     await at_rest(anna);

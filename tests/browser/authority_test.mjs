@@ -1,7 +1,7 @@
 // Two people, one robot: who is in control, what the other may do, a tab that is killed, a script without a lease, and a
 // page whose network stands still while it drives.
 import assert from 'node:assert/strict';
-import { clear_latch, hold_by_mouse, live, mode_of as mode, samples, sign_in, take_control } from './hands.mjs';
+import { clear_latch, click_if_offered, hold_by_mouse, live, mode_of as mode, samples, sign_in, take_control } from './hands.mjs';
 import { Bench, until } from './programs.mjs';
 
 const kRobot = 'rheo-1';
@@ -96,7 +96,7 @@ const steps = {
     await until('and that is an event', async () => (await events('control_expired')).length > 0);
     await command_until(anna, 60, async () => (await holder()).includes('anna') && (await mode(anna)) === 'auto');
     await until('manual', async () => {
-      await anna.click('#to-manual', { timeout: 1000 }).catch(() => undefined);
+      await click_if_offered(anna, '#to-manual');
       return (await mode(anna)) === 'manual';
     });
     await anna.click('#release-control');

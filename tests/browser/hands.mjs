@@ -50,12 +50,17 @@ export async function sign_in(page, at, user, password, inside) {
   });
 }
 
+// Clicks it if it is there and can be clicked now. A click in a slow browser takes seconds, so it is not cut short.
+export async function click_if_offered(page, selector) {
+  if ((await page.locator(`${selector}:enabled`).count()) > 0) await page.click(selector, { timeout: 20_000 }).catch(() => undefined);
+}
+
 // Clicks what takes control, until `is_taken`: a picture that is too old to take control by is refused.
 export const take_control = (page, is_taken) =>
   until('control is taken', async () => {
     if (await is_taken()) return true;
-    await page.click('#take-control', { timeout: 500 }).catch(() => undefined);
-    return false;
+    await click_if_offered(page, '#take-control');
+    return until('it is', is_taken, 2000).catch(() => false);
   });
 
 // Sends a setpoint until the page says that it is in force: a command that is too old when it arrives is refused.
@@ -78,7 +83,7 @@ export async function engage_auto(page, setpoint_mm) {
 export const held = (page, runs, begin, end) =>
   until('the duty runs', async () => {
     await begin();
-    if (await until('it runs', runs, 4000).catch(() => false)) return true;
+    if (await until('it runs', runs, 8000).catch(() => false)) return true;
     await end();
     await live(page);
     return false;
@@ -95,7 +100,7 @@ export const hold = (page, selector, what, done) =>
     await button.scrollIntoViewIfNeeded();
     await button.hover();
     await page.mouse.down();
-    await until(what, done, 3000).catch(() => undefined);
+    await until(what, done, 8000).catch(() => undefined);
     await page.mouse.up();
     return done();
   });

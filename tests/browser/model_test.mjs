@@ -2,6 +2,7 @@
 import assert from 'node:assert/strict';
 import { writeFileSync } from 'node:fs';
 import { join } from 'node:path';
+import { click_if_offered } from './hands.mjs';
 import { Bench, until } from './programs.mjs';
 
 const kRobot = 'rheo-1';
@@ -37,7 +38,7 @@ const steps = {
     await says('notice', notice, 'The model of water is not in force: the robot has taken it back: a parameter was changed.');
     await page.locator('#take-control').waitFor(); // the script has gone silent
     await until('the model is in force again', async () => { // one that is too old when it arrives is refused
-      await page.click('#send-model', { timeout: 1000 }).catch(() => undefined);
+      await click_if_offered(page, '#send-model');
       return until('it is', async () => (await foot()).includes('model of water, confirmed'), 4000).catch(() => false);
     });
   },

@@ -29,20 +29,22 @@ async function shared_browser() {
 async function report(name, bench, error) {
   console.error(`${name} failed:`, error);
   mkdirSync(out, { recursive: true });
-  for (const [number, page] of bench.pages.entries()) {
-    await page.screenshot({ path: `${out}failed_${name}_${number}.png`, timeout: 5000 }).catch(() => undefined);
+  for (const [number, page] of (bench?.pages ?? []).entries()) {
+    await page.screenshot({ path: `${out}failed_${name}_${number}.png`, timeout: 20_000 }).catch(() => undefined);
   }
-  console.error(`${name}, station:\n${bench.station?.output}\nrobot:\n${bench.robot?.output}\nfleet:\n${bench.fleet?.output}`);
+  console.error(`${name}, station:\n${bench?.station?.output}\nrobot:\n${bench?.robot?.output}\nfleet:\n${bench?.fleet?.output}`);
 }
 
 async function tell(name) {
   const start_ms = performance.now();
-  const { bench, steps, open } = (await import(new URL(`${name}_test.mjs`, folder))).story;
+  let bench = null;
   try {
+    const { story } = await import(new URL(`${name}_test.mjs`, folder));
+    bench = story.bench;
     bench.browser = await shared_browser();
     await bench.start_station();
-    await open?.();
-    for (const [title, step] of Object.entries(steps)) {
+    await story.open?.();
+    for (const [title, step] of Object.entries(story.steps)) {
       const begun_ms = performance.now();
       await step();
       console.log(`ok  ${name}: ${title} (${since(begun_ms)} ms)`);
@@ -51,12 +53,11 @@ async function tell(name) {
     failed.add(name);
     await report(name, bench, error);
   }
-  const ending_ms = performance.now();
-  await bench.close().catch((error) => {
+  await bench?.close().catch((error) => {
     failed.add(name);
     console.error(`${name} did not end:`, error);
   });
-  console.log(`${failed.has(name) ? 'FAILED' : '=='}  ${name} (${since(start_ms)} ms, ${since(ending_ms)} ms of them to end)`);
+  console.log(`${failed.has(name) ? 'FAILED' : '=='}  ${name} (${since(start_ms)} ms)`);
 }
 
 process.on('unhandledRejection', (error) => {
