@@ -2,12 +2,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <cstdlib>
-#include <filesystem>
 #include <fstream>
 
 #include "control/identification/identify.hpp"
 #include "recorded_runs.hpp"
+#include "tests/control/figures.hpp"
 
 namespace control {
 namespace {
@@ -17,11 +16,6 @@ using testing::Contains;
 using testing::HasSubstr;
 
 constexpr double kPaperResidualM = 1.16e-3;
-
-std::filesystem::path figure_path(const char* name) {
-  const char* folder = std::getenv("RHEONAUT_FIGURES");
-  return std::filesystem::path(folder != nullptr ? folder : testing::TempDir()) / name;
-}
 
 TEST(Figure5, TheModelIsFoundAsFarAsTheRunCanTell) {
   const Recording run = position_run(kNonNewtonianModel, step_duty(0.3, 5, 0.01), kPaperResidualM, 5);

@@ -2,12 +2,11 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <cstdlib>
-#include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "control/tuning/tune.hpp"
+#include "tests/control/figures.hpp"
 
 namespace control {
 namespace {
@@ -24,19 +23,11 @@ double magnitude_at(const OpenLoop& loop, double omega_rad_s) {
   return std::abs(open_loop_response(loop, omega_rad_s));
 }
 
-// The folder that the figures are drawn from, or a temporary one.
-std::filesystem::path figure_folder() {
-  const char* folder = std::getenv("RHEONAUT_FIGURES");
-  std::filesystem::path path = folder ? folder : testing::TempDir();
-  std::filesystem::create_directories(path);
-  return path;
-}
-
 TEST(Figure6, IsWrittenAsTheReferenceHasIt) {
   const auto reference = golden();
   const std::vector<double> omega_rad_s = reference["w"];
   const auto points = bode(kPositionLoop, omega_rad_s);
-  const auto path = figure_folder() / "figure_6_bode.csv";
+  const auto path = figure_path("figure_6_bode.csv");
   std::ofstream csv{path};
   csv.precision(12);
   csv << "omega_rad_s,magnitude_db,phase_deg\n";

@@ -1,10 +1,12 @@
-// What the tests of the closed-loop figures share: the experiment of the paper, and a place for its curves.
+// What the tests of the figures share: the paper's experiment in closed loop, and a place for the curves.
 #pragma once
 
 #include <gtest/gtest.h>
+#include <stdlib.h>
 
-#include <cstdlib>
+#include <filesystem>
 #include <fstream>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -26,10 +28,41 @@ struct FigureColumn {
   std::vector<double> values;
 };
 
-// Into the folder that RHEONAUT_FIGURES names, or else the temporary one.
+// The folder that RHEONAUT_FIGURES names, or else one of this process, which goes with it.
+class FigureFolder {
+ public:
+  FigureFolder() {
+    if (const char* named = std::getenv("RHEONAUT_FIGURES")) {
+      path_ = named;
+      std::filesystem::create_directories(path_);
+      return;
+    }
+    std::string name = (std::filesystem::temp_directory_path() / "rheonaut-figures-XXXXXX").string();
+    if (mkdtemp(name.data()) == nullptr) throw std::runtime_error{"cannot make a folder " + name};
+    path_ = name;
+    is_temporary_ = true;
+  }
+  ~FigureFolder() {
+    std::error_code ignored;
+    if (is_temporary_) std::filesystem::remove_all(path_, ignored);
+  }
+  FigureFolder(const FigureFolder&) = delete;
+  FigureFolder& operator=(const FigureFolder&) = delete;
+
+  const std::filesystem::path& path() const { return path_; }
+
+ private:
+  std::filesystem::path path_;
+  bool is_temporary_ = false;
+};
+
+inline std::filesystem::path figure_path(const std::string& name) {
+  static const FigureFolder folder;
+  return folder.path() / name;
+}
+
 inline void write_figure(const std::string& name, const std::vector<FigureColumn>& columns) {
-  const char* folder = std::getenv("RHEONAUT_FIGURES");
-  const std::string path = (folder ? std::string(folder) + "/" : testing::TempDir()) + name;
+  const std::filesystem::path path = figure_path(name);
   std::ofstream file(path);
   for (std::size_t i = 0; i < columns.size(); ++i) file << (i ? "," : "") << columns[i].name;
   file << '\n';

@@ -107,7 +107,7 @@ TEST(SearchLimit, ReachesEveryStructureWhenTheFirstWouldTakeAllTheTime) {
 }
 
 TEST(SearchLimit, CancelsWithinAnIteration) {
-  IdentificationOptions options;
+  IdentificationOptions options = unhurried_options();
   options.longest_dead_time_s = 0.2;
   int calls = 0;
   long looks = 0, looks_when_cancelled = 0;
@@ -123,7 +123,7 @@ TEST(SearchLimit, CancelsWithinAnIteration) {
 }
 
 TEST(SearchLimit, AnUntriedStructureLosesNoComparison) {
-  IdentificationOptions options;
+  IdentificationOptions options = unhurried_options();
   options.on_progress = [](const Progress& progress) { return progress.structure == Structure::first_order; };
   const Identification found = identify(long_run(301), options);
   ASSERT_EQ(found.compared.size(), 3U);

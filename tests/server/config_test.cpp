@@ -3,7 +3,9 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <stdlib.h>
 
+#include <filesystem>
 #include <fstream>
 #include <sstream>
 
@@ -15,7 +17,11 @@ using ::testing::HasSubstr;
 
 class ConfigTest : public ::testing::Test {
  public:
-  ConfigTest() { std::filesystem::create_directories(folder_); }
+  ConfigTest() {
+    std::string name = (std::filesystem::temp_directory_path() / "rheonaut-config-XXXXXX").string();
+    if (mkdtemp(name.data()) == nullptr) throw std::runtime_error{"cannot make a folder " + name};
+    folder_ = name;
+  }
   ~ConfigTest() override { std::filesystem::remove_all(folder_); }
 
  protected:
@@ -36,7 +42,7 @@ class ConfigTest : public ::testing::Test {
   }
 
  private:
-  std::filesystem::path folder_ = std::filesystem::path{::testing::TempDir()} / ("config_" + std::to_string(getpid()));
+  std::filesystem::path folder_;
 };
 
 TEST_F(ConfigTest, DefaultsListenOnLoopbackOnly) {

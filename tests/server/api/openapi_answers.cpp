@@ -28,6 +28,13 @@ const json& resolved(const json& schema) {
   return resolved(document().at(json::json_pointer{schema["$ref"].get<std::string>().substr(1)}));
 }
 
+// The member, or null. Not a copy: a schema may be most of the document.
+const json& member_of(const json& schema, const char* key) {
+  static const json kNull;
+  const auto found = schema.find(key);
+  return found == schema.end() ? kNull : *found;
+}
+
 bool is_integer(const json& value) {
   return value.is_number_integer() ||
          (value.is_number_float() && std::trunc(value.get<double>()) == value.get<double>());
@@ -52,14 +59,14 @@ bool matches(const std::string& text, const std::string& pattern) {
 // The members that an object may have; none: any.
 std::optional<std::set<std::string>> known_members(const json& given) {
   const json& schema = resolved(given);
-  const json additional = schema.value("additionalProperties", json());
+  const json& additional = member_of(schema, "additionalProperties");
   if (additional.is_object() || additional == true) return std::nullopt;
   std::set<std::string> names;
-  const json properties = schema.value("properties", json::object());
+  const json& properties = member_of(schema, "properties");
   for (const auto& [name, property] : properties.items()) names.insert(name);
   bool is_open = properties.empty() && additional.is_null();
   for (const char* key : {"allOf", "oneOf", "anyOf"}) {
-    for (const json& part : schema.value(key, json::array())) {
+    for (const json& part : member_of(schema, key)) {
       is_open = false;
       const auto more = known_members(part);
       if (!more) return std::nullopt;
@@ -85,7 +92,7 @@ class Check {
     if (value.is_array()) check_items(schema, value, at);
     if (value.is_object()) check_members(schema, value, at);
     if (value.is_object() && !is_part) check_known(schema, value, at);
-    for (const json& part : schema.value("allOf", json::array())) this->value(part, value, at, true);
+    for (const json& part : member_of(schema, "allOf")) this->value(part, value, at, true);
     for (const char* key : {"oneOf", "anyOf"}) check_choice(schema, key, value, at);
   }
 
@@ -130,11 +137,11 @@ class Check {
   }
 
   void check_members(const json& schema, const json& value, const std::string& at) {
-    for (const json& name : schema.value("required", json::array())) {
+    for (const json& name : member_of(schema, "required")) {
       if (!value.contains(name)) fault(at, value, "has no " + name.get<std::string>());
     }
-    const json properties = schema.value("properties", json::object());
-    const json additional = schema.value("additionalProperties", json());
+    const json& properties = member_of(schema, "properties");
+    const json& additional = member_of(schema, "additionalProperties");
     for (const auto& [name, member] : value.items()) {
       const std::string inner = at.empty() ? name : at + "." + name;
       if (properties.contains(name)) {
@@ -189,13 +196,13 @@ std::vector<std::string> answer_faults(const std::string& method, const std::str
     return {fmt::format("{} {}: the status {} is not described", method, pattern, status)};
   }
   const json& response = resolved(responses.at(responses.contains(code) ? code : "default"));
-  const json content = response.value("content", json::object());
+  const json& content = member_of(response, "content");
   const std::string type = content_type.substr(0, content_type.find(';'));
   if (!content.contains(type)) {
     if (body.empty()) return {};
     return {fmt::format("{} {}: content of type '{}' is not described", method, pattern, content_type)};
   }
-  const json schema = content[type].value("schema", json());
+  const json& schema = member_of(content.at(type), "schema");
   if (method == "HEAD" || !type.ends_with("json") || !schema.is_object()) return {};
   const json value = json::parse(body);
   std::vector<std::string> faults = schema_faults(schema, value);

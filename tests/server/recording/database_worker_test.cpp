@@ -3,8 +3,9 @@
 #include "server/storage/commits/database_worker.hpp"
 
 #include <gtest/gtest.h>
-#include <unistd.h>
+#include <stdlib.h>
 
+#include <filesystem>
 #include <fstream>
 
 #include "server/runtime/tasks.hpp"
@@ -16,7 +17,6 @@ using namespace std::chrono_literals;
 
 class DatabaseWorkerTest : public ::testing::Test {
  protected:
-  DatabaseWorkerTest() { std::filesystem::create_directories(folder_); }
   ~DatabaseWorkerTest() override { std::filesystem::remove_all(folder_); }
 
   storage::OpenedDatabase open() { return runtime::run_first(loop_, database_.open(clock_.utc_us())); }
@@ -28,6 +28,11 @@ class DatabaseWorkerTest : public ::testing::Test {
   std::int64_t number(const std::string& sql) {
     auto job = [sql](storage::Database& database) { return database.handle().execAndGet(sql).getInt64(); };
     return runtime::run_first(loop_, database_.run(std::move(job)));
+  }
+  static std::filesystem::path new_folder() {
+    std::string name = (std::filesystem::temp_directory_path() / "rheonaut-worker-XXXXXX").string();
+    if (mkdtemp(name.data()) == nullptr) throw std::runtime_error{"cannot make a folder " + name};
+    return name;
   }
   static station::AuditNote note(const std::string& action) {
     station::AuditNote note;
@@ -44,8 +49,7 @@ class DatabaseWorkerTest : public ::testing::Test {
     return number("SELECT count(*) FROM audit WHERE action = '" + action + "'");
   }
 
-  const std::filesystem::path folder_ =
-      std::filesystem::path{::testing::TempDir()} / ("database_worker_" + std::to_string(::getpid()));
+  const std::filesystem::path folder_ = new_folder();
   const std::filesystem::path path_ = folder_ / "station.sqlite";
   boost::asio::io_context loop_{1};
   runtime::SystemClock clock_{loop_};

@@ -20,7 +20,7 @@ class HeldCheckpointTest : public RecordingTest {
     clock_.remove_worker(checkpoints_);      // time goes on beside a pass
     vfs_.hold_database_writes();
     for (int i = 0; i < 30 && recorder_->wal().bytes < kCheckpointBytes; ++i) make_some();
-    ASSERT_TRUE(vfs_.await_held_write(10s));
+    ASSERT_TRUE(vfs_.await_held_write(2min));
   }
   void TearDown() override {
     if (!was_let_go_) let_go();
