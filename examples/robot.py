@@ -372,6 +372,14 @@ class Robot:
         pass
 
 
+async def until_it_shall_end(link):
+    """A signal cancels the link between two of its steps, and never in the middle of one."""
+    for end in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        if signal.getsignal(end) != signal.SIG_IGN:  # nohup ignores SIGHUP
+            asyncio.get_running_loop().add_signal_handler(end, asyncio.current_task().cancel)
+    await link.run()
+
+
 def main():
     parser = argparse.ArgumentParser(description="A simulated cart on a track, for a Rheonaut station.")
     parser.add_argument("--station", type=address, default="127.0.0.1:7070", metavar="HOST:PORT")
@@ -382,12 +390,9 @@ def main():
     if options.token_file and not options.tls_ca and options.station[0] not in ("127.0.0.1", "::1", "localhost"):
         parser.error(f"--token-file without --tls-ca: anybody between here and {options.station[0]} could read the token")
     robot = Robot(options.id, options.token_file.read().strip() if options.token_file else "")
-    for end in (signal.SIGTERM, signal.SIGHUP):
-        if signal.getsignal(end) != signal.SIG_IGN:  # nohup ignores SIGHUP
-            signal.signal(end, signal.default_int_handler)  # it ends like Ctrl-C
     try:
-        asyncio.run(StationLink(robot, *options.station, options.tls_ca).run())
-    except KeyboardInterrupt:
+        asyncio.run(until_it_shall_end(StationLink(robot, *options.station, options.tls_ca)))
+    except asyncio.CancelledError:
         return 0
     finally:
         robot.cart.duty = 0.0  # SAFETY: a program that ends leaves the motor off

@@ -192,6 +192,8 @@ const steps = {
     await until('the one before', async () => Math.abs(at_s() - since(recorded[before])) < 2e-6);
     const disturbed = recorded.find((sample) => sample.disturbance_m !== 0);
     await open(`#/runs/1/replay?at=${since(disturbed) - 0.2}`);
+    await assert_numerals(since(disturbed) - 0.2);
+    await page.locator('.replay-log li').first().waitFor(); // what happened is known
     await page.locator('body').press('PageDown');
     await until('the disturbance', async () => Math.abs(at_s() - since(disturbed)) < 0.1);
     await page.locator('.replay-log').getByText('disturbance −20.0 mm').first().waitFor();

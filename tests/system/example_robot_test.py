@@ -351,7 +351,7 @@ class ExampleRobotTest(unittest.TestCase):
             if status is None:
                 seen = self.station.robot("ends")["next_seq"]
                 wait_until(lambda: self.station.robot("ends")["next_seq"] > seen + 50, PATIENCE_S, "it goes on")
-                robot.send_signal(signal.SIGINT)
+                robot.send_signal(signal.SIGTERM)  # a shell's job in the background would ignore SIGINT
             self.assertEqual(robot.wait(timeout=PATIENCE_S), 0)
 
     def test_it_sends_no_token_in_clear_text_to_another_machine(self):
