@@ -15,7 +15,6 @@ import asyncio
 import collections
 import math
 import secrets
-import signal
 import sys
 import time
 
@@ -372,14 +371,6 @@ class Robot:
         pass
 
 
-async def until_it_shall_end(link):
-    """A signal cancels the link between two of its steps, and never in the middle of one."""
-    for end in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-        if signal.getsignal(end) != signal.SIG_IGN:  # nohup ignores SIGHUP
-            asyncio.get_running_loop().add_signal_handler(end, asyncio.current_task().cancel)
-    await link.run()
-
-
 def main():
     parser = argparse.ArgumentParser(description="A simulated cart on a track, for a Rheonaut station.")
     parser.add_argument("--station", type=address, default="127.0.0.1:7070", metavar="HOST:PORT")
@@ -391,7 +382,7 @@ def main():
         parser.error(f"--token-file without --tls-ca: anybody between here and {options.station[0]} could read the token")
     robot = Robot(options.id, options.token_file.read().strip() if options.token_file else "")
     try:
-        asyncio.run(until_it_shall_end(StationLink(robot, *options.station, options.tls_ca)))
+        asyncio.run(StationLink(robot, *options.station, options.tls_ca).run_until_signalled())
     except asyncio.CancelledError:
         return 0
     finally:

@@ -10,6 +10,7 @@ import collections
 import importlib
 import pathlib
 import random
+import signal
 import socket
 import ssl
 import subprocess
@@ -247,6 +248,13 @@ class StationLink:
         if line != self.said:  # not again at each attempt
             print(f"robot.py: {line}", flush=True)
         self.said = line
+
+    async def run_until_signalled(self):
+        """A signal cancels the link between two of its steps, and never in the middle of one."""
+        for end in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+            if signal.getsignal(end) != signal.SIG_IGN:  # nohup ignores SIGHUP
+                asyncio.get_running_loop().add_signal_handler(end, asyncio.current_task().cancel)
+        await self.run()
 
     async def run(self):
         async with asyncio.TaskGroup() as tasks:
