@@ -11,8 +11,8 @@ Usage: deploy/reach.py FILE... (paths from the top of the tree; a deleted file i
 
 A room is reached with all of its files, since a header may be carried out by any source of its room. A file that is no
 source (a document, a table of numbers) reaches the tests whose sources name it. A test with processes is reached by its
-own scripts, and by the files that they name. A change of the programs or of the page would reach all of them, half an
-hour: it has TOGETHER instead, and CI runs the others.
+own scripts, and by the files that they name. A change of the programs or of the page would reach all of them, a quarter
+of an hour: it has TOGETHER instead, and CI runs the others.
 """
 import pathlib
 import re

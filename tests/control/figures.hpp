@@ -1,4 +1,4 @@
-// What the tests of the figures share: the paper's experiment in closed loop, and a place for the curves.
+// Parts that the tests of the figures share: the paper's experiment in closed loop, and a place for the curves.
 #pragma once
 
 #include <gtest/gtest.h>

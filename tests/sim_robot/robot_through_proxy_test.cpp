@@ -77,7 +77,7 @@ class RobotThroughProxy : public ProxyTest {
     return run_until([&] { return robot->robot().core().link_up() && samples > received + 5; });
   }
 
-  // What is on its way arrives, also on a busy machine.
+  // Frames on their way arrive, also on a busy machine.
   void settle() {
     loop.run_for(50ms);
     while (loop.poll() > 0) continue;
