@@ -1,7 +1,7 @@
 // Two pages that fight for one robot, every way in which a hand leaves a held control, a tab that is closed under it, and a
 // page that slept: whatever happens, one commands at a time, a duty ends, and nothing that was held is sent afterwards.
 import assert from 'node:assert/strict';
-import { clear_by_script, click_if_offered, held as held_by, hold_by_mouse, live, mode_of as mode, samples, sign_in as sign_in_by } from './hands.mjs';
+import { clear_by_script, click_if_offered, held as held_by, hold_by_mouse, in_auto, live, mode_of as mode, samples, sign_in as sign_in_by } from './hands.mjs';
 import { Bench, until } from './programs.mjs';
 
 const kRobot = 'rheo-1';
@@ -292,7 +292,7 @@ const steps = {
     await sleeper.keyboard.press('ArrowRight'); // moved, and not sent
     const woken = await asleep(true, async () => {
       await until('control has expired', async () => (await holder()) === '');
-      assert.equal((await bench.post(`/robots/${kRobot}/commands`, { kind: 'set_setpoint', setpoint_m: 0.06 })).status, 200);
+      await in_auto(bench, kRobot, 0.06);
     });
     await live(sleeper);
     await until('the page shows the setpoint in force', async () => /60/.test(await sleeper.locator('#numeral-setpoint output').innerText()));

@@ -111,6 +111,27 @@ export async function clear_latch(page) {
   await hold(page, '#clear-emergency', 'the latch is cleared', async () => (await mode_of(page)) === 'manual');
 }
 
+// The answer to a script's command, 200. A machine that stood still may have ended the robot's link, or have let the command
+// expire: then it is given again once the robot is there.
+export async function commanded(bench, robot_id, body) {
+  return until(`${JSON.stringify(body)} is carried out`, async () => {
+    const { status, answer } = await bench.post(`/robots/${robot_id}/commands`, body);
+    if (status === 504 || answer.reason === 'not_connected') return false;
+    assert.equal(status, 200, JSON.stringify(answer));
+    return answer;
+  });
+}
+
+// The robot in auto with this setpoint, sent there by a script. A link that a busy machine broke has ended auto: it is sent
+// there again.
+export const in_auto = (bench, robot_id, setpoint_m) =>
+  until(`${robot_id} is in auto at ${setpoint_m} m`, async () => {
+    const now = await bench.ask(`/robots/${robot_id}`);
+    if (now.mode === 'auto' && Math.abs(now.setpoint_m - setpoint_m) < 1e-6) return true;
+    await commanded(bench, robot_id, { kind: 'set_mode', mode: 'auto', setpoint_m });
+    return false;
+  });
+
 // The same as a script does it. The page may have sent a stop a second time: the latest latch is cleared.
 export const clear_by_script = (bench, robot_id) =>
   until('the latch is cleared', async () => {

@@ -2,7 +2,7 @@
 import assert from 'node:assert/strict';
 import { writeFileSync } from 'node:fs';
 import { join } from 'node:path';
-import { click_if_offered } from './hands.mjs';
+import { click_if_offered, commanded } from './hands.mjs';
 import { Bench, until } from './programs.mjs';
 
 const kRobot = 'rheo-1';
@@ -33,7 +33,7 @@ const steps = {
 
   async 'one that is no longer in force is sent again by a button'() {
     await page.locator('#take-control').waitFor(); // to name a fluid takes no control
-    assert.equal((await bench.post(`/robots/${kRobot}/commands`, { kind: 'set_parameter', name: 'model_gain_3_m_s', value: 0.01 })).status, 200);
+    await commanded(bench, kRobot, { kind: 'set_parameter', name: 'model_gain_3_m_s', value: 0.01 });
     await says('numeral', foot, 'model assumed');
     await says('notice', notice, 'The model of water is not in force: the robot has taken it back: a parameter was changed.');
     await page.locator('#take-control').waitFor(); // the script has gone silent

@@ -1,6 +1,6 @@
 // The view of a robot: its past and present in the plots, the setpoint that is dragged, and a gamepad.
 import assert from 'node:assert/strict';
-import { clear_by_script, clear_latch, drawn, held, live as is_fresh, samples, seen_mode, shows, trace_pixels } from './hands.mjs';
+import { clear_by_script, clear_latch, drawn, held, in_auto, live as is_fresh, samples, seen_mode, shows, trace_pixels } from './hands.mjs';
 import { Bench, until } from './programs.mjs';
 
 const kRobot = 'rheo-1';
@@ -38,7 +38,7 @@ const steps = {
     bench.start_robot(kRobot);
     await page.locator('.annunciator h1').getByText(kRobot).waitFor();
     await live();
-    assert.equal((await command({ kind: 'set_mode', mode: 'auto', setpoint_m: 0.1 })).status, 200);
+    await in_auto(bench, kRobot, 0.1);
     await samples(bench, kRobot, 500);
     const reloaded_ms = Date.now();
     await page.reload();

@@ -5,7 +5,7 @@
 import assert from 'node:assert/strict';
 import { join } from 'node:path';
 import { assert_accessible } from './accessible.mjs';
-import { clear_by_script, go_to, hold_by_mouse, samples, watch_attribute } from './hands.mjs';
+import { clear_by_script, commanded, go_to, hold_by_mouse, samples, watch_attribute } from './hands.mjs';
 import { Bench, until } from './programs.mjs';
 
 const kRobot = 'rheo-1';
@@ -27,10 +27,7 @@ const query = () => new URLSearchParams(page.url().split('?')[1] ?? '');
 const at_s = () => Number(query().get('at'));
 const command_rows = async () => (await bench.ask(`/robots/${kRobot}/commands?limit=1000`)).commands.length;
 const length_s = () => (recorded.at(-1).utc_us - recorded[0].utc_us) / 1e6;
-const command = async (body) => {
-  const { status, answer } = await bench.post(`/robots/${kRobot}/commands`, body);
-  assert.equal(status, 200, JSON.stringify(answer));
-};
+const command = (body) => commanded(bench, kRobot, body);
 const seconds = (count) => samples(bench, kRobot, count * 100);
 
 // The sample at or next before a moment of the run.

@@ -5,7 +5,7 @@ import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { assert_accessible } from './accessible.mjs';
-import { clear_by_script, go_to, samples, shows } from './hands.mjs';
+import { clear_by_script, commanded, go_to, samples, shows } from './hands.mjs';
 import { Bench, until } from './programs.mjs';
 
 const kRobot = 'rheo-1';
@@ -23,10 +23,7 @@ const rows = () => page.locator('#run-table tbody tr').count();
 const names = () => page.locator('#run-table .name a').allInnerTexts();
 const hash = () => page.evaluate(() => location.hash);
 const picture = async (name) => pictures && page.screenshot({ path: join(pictures, `${name}.png`) });
-const command = async (body) => {
-  const { status, answer } = await bench.post(`/robots/${kRobot}/commands`, body);
-  assert.equal(status, 200, JSON.stringify(answer));
-};
+const command = (body) => commanded(bench, kRobot, body);
 const seconds = (count) => samples(bench, kRobot, count * 100);
 const address_is = (wanted) => until(`the address is ${wanted}`, async () => (await hash()) === wanted);
 

@@ -3,7 +3,7 @@ import assert from 'node:assert/strict';
 import { existsSync } from 'node:fs';
 import { createRequire } from 'node:module';
 import { assert_accessible } from './accessible.mjs';
-import { hold as hold_on, shows, sign_in } from './hands.mjs';
+import { commanded, hold as hold_on, shows, sign_in } from './hands.mjs';
 import { Bench, until } from './programs.mjs';
 
 const { encode } = createRequire(new URL('../../web/package.json', import.meta.url))('uqr');
@@ -246,8 +246,7 @@ const steps = {
   },
 
   async 'what is new comes on top by itself, and older pages on demand'() {
-    const pinged = await bench.post('/robots/sim-2/commands', { kind: 'ping' });
-    assert.equal(pinged.status, 200);
+    await commanded(bench, 'sim-2', { kind: 'ping' });
     await until('it is on top', async () => /^command\./.test(await page.locator('tr[data-entry]').first().getAttribute('data-action')));
     for (let at = 0; at < 110; ++at) await bench.post('/robots/sim-2/commands', { kind: 'ping' });
     await page.reload();

@@ -5,7 +5,7 @@
 import assert from 'node:assert/strict';
 import { join } from 'node:path';
 import { assert_accessible } from './accessible.mjs';
-import { drawn as frames, live as is_fresh, samples, shows } from './hands.mjs';
+import { commanded, drawn as frames, live as is_fresh, samples, shows } from './hands.mjs';
 import { Bench, until } from './programs.mjs';
 
 const kRobot = 'rheo-1';
@@ -66,7 +66,7 @@ const steps = {
   },
 
   async 'what is predicted of an experiment is drawn while it runs, and afterwards'() {
-    assert.equal((await bench.post(`/robots/${kRobot}/commands`, { kind: 'zero_position' })).status, 200);
+    await commanded(bench, kRobot, { kind: 'zero_position' });
     const { status, answer } = await bench.post('/experiments', { robot_id: kRobot, profile: kProfile });
     assert.equal(status, 202, JSON.stringify(answer));
     const id = answer.experiment_id;

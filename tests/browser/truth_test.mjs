@@ -1,7 +1,7 @@
 // What the page shows is true: where a robot is that a disturbance moves, what is known while the station is silent, a
 // run that was interrupted, an emergency in a tab that nobody looks at, and plots that never cover a control.
 import assert from 'node:assert/strict';
-import { clear_latch, drawn, live as fresh, samples, seen_mode, shows, take_control } from './hands.mjs';
+import { clear_latch, commanded, drawn, in_auto, live as fresh, samples, seen_mode, shows, take_control } from './hands.mjs';
 import { Bench, until } from './programs.mjs';
 
 const kRobot = 'rheo-1';
@@ -11,7 +11,6 @@ let page;
 const text = (selector) => page.locator(selector).first().innerText();
 const number = async (name) => Number((await text(`#numeral-${name} output`)).replace('\u2212', '-'));
 const robot = () => bench.ask(`/robots/${kRobot}`);
-const command = (body) => bench.post(`/robots/${kRobot}/commands`, body);
 const live = async () => {
   await page.locator('.top-bar .lamp.good').waitFor();
   await fresh(page);
@@ -30,13 +29,16 @@ const steps = {
     bench.start_robot(kRobot);
     await page.locator('.annunciator h1').getByText(kRobot).waitFor();
     await live();
-    assert.equal((await command({ kind: 'set_mode', mode: 'auto', setpoint_m: 0.1 })).status, 200);
-    await until('the robot is at 100 mm', async () => Math.abs((await number('position')) - 100) < 2);
+    await until('the robot is at 100 mm', async () => {
+      await in_auto(bench, kRobot, 0.1);
+      return Math.abs((await number('position')) - 100) < 2;
+    });
     await shows(page, '#disturbance', 'disturbance 0.0 mm');
     const both = await page.evaluate(() => ['seen', 'position'].map((name) => document.querySelector(`#numeral-${name} output`).textContent));
     assert.equal(both[0], both[1], 'without a disturbance it sees where it is');
-    assert.equal((await command({ kind: 'inject_disturbance', disturbance_m: -0.05 })).status, 200);
+    await commanded(bench, kRobot, { kind: 'inject_disturbance', disturbance_m: -0.05 });
     await until('the robot stays at 150 mm', async () => {
+      await in_auto(bench, kRobot, 0.1);
       const now = await robot();
       return Math.abs(now.sample.position_m - now.disturbance_m - 0.15) < 0.001 && Math.abs(now.sample.velocity_m_s) < 0.001;
     });

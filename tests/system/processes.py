@@ -126,14 +126,16 @@ def keep_traces(place):
 
 
 def commanded(station, kind, robot_id="sim-1", **arguments):
-    """The answer to a command. One that a machine which stood still has let expire is given again."""
+    """The answer to a command. One that a machine which stood still has let expire, or whose robot it has kept from its
+    link, is given again."""
     deadline = time.monotonic() + PATIENCE_S
     while True:
         try:
             return station.command(robot_id, kind, **arguments)
         except ApiError as error:
-            if error.status != 504 or time.monotonic() > deadline:
+            if (error.status != 504 and error.reason != "not_connected") or time.monotonic() > deadline:
                 raise
+            time.sleep(0.02)
 
 
 def swimming(station, robot_id="sim-1", setpoint_m=0.5):
