@@ -60,6 +60,7 @@ with sqlite3.connect(database) as connection:
         copy("segment", "last_row", {"first_seq": n * numbers, "last_seq": n * numbers, "first_row": n * rows, "last_row": n * rows, "first_robot_time_us": n * length_us})
     connection.execute("UPDATE boot SET last_robot_time_us = ?, announced_next_seq = ?, durable_next_seq = ?, grouped_next_seq = 0", (copies * length_us, copies * numbers, copies * numbers))
     connection.execute("DELETE FROM segment_group")
+    connection.execute("UPDATE meta SET value = ? WHERE name = 'next_row'", (copies * rows + 1,))
     print(*connection.execute("SELECT sum(last_seq - first_seq + 1), max(first_robot_time_us + (last_seq - first_seq) * period_us) + ? FROM segment", (begin_us,)).fetchone())
 `;
 
@@ -128,7 +129,9 @@ const steps = {
     for (const [from, to] of [[0.03, 0.1], [0.45, 0.55], [0.85, 0.95]]) await trace_between(from, to);
     assert.equal(await page.getAttribute('#plots-live', 'aria-pressed'), 'true');
     await settled();
-    assert.ok(!asked.some((path) => path.includes('/samples?')), 'and for none of the 360 000 samples');
+    // What the view of a minute asked for may be on its way still.
+    const asks_for_the_hour = (path) => path.includes('/samples?') && Number(new URL(path).searchParams.get('from_us') ?? 0) < to_ms * 1000;
+    assert.ok(!asked.some(asks_for_the_hour), 'and for none of the 360 000 samples');
     const newest = await point_at(0.999);
     await until('the newest follows', async () => (await text('.strip-0 .cursor')) !== newest);
   },
