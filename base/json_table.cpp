@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "base/invalid_argument.hpp"
+#include "base/json_text.hpp"
 #include "base/toml_text.hpp"
 
 namespace base {
@@ -60,12 +61,6 @@ class Watch {
   std::vector<std::set<std::string>> keys_;  // of the objects that are open
 };
 
-// nlohmann's messages begin with its own name in brackets, and say line and column.
-std::string without_origin(const std::string& message) {
-  const std::size_t bracket = message.find("] ");
-  return bracket == std::string::npos ? message : message.substr(bracket + 2);
-}
-
 }  // namespace
 
 toml::table table_of(const Json& object) {
@@ -86,7 +81,7 @@ toml::table parse_json_table(std::string_view text, const std::string& name) try
   if (!parsed.is_object()) throw_invalid("is JSON, but not an object");
   return table_of(parsed);
 } catch (const Json::exception& error) {
-  throw_invalid(name, ": is not JSON: ", without_origin(error.what()));
+  throw_invalid(name, ": is not JSON: ", fault_of(error));
 } catch (const std::invalid_argument& error) {
   throw_invalid(name, ": ", error.what());
 }

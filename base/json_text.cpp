@@ -19,4 +19,11 @@ std::string dump(const nlohmann::json& value) {
   return value.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
 }
 
+// The library's messages begin with its own name in brackets.
+std::string fault_of(const nlohmann::json::exception& error) {
+  const std::string message = error.what();
+  const std::size_t bracket = message.find("] ");
+  return bracket == std::string::npos ? message : message.substr(bracket + 2);
+}
+
 }  // namespace base

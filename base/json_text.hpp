@@ -1,4 +1,4 @@
-// Writes JSON text: floats as short decimals, and strings that need not be UTF-8.
+// JSON as text: floats as short decimals, strings that need not be UTF-8, and what is wrong with a text.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -11,5 +11,8 @@ nlohmann::json decimal(float value);
 
 // The text of a JSON value; bytes that are not UTF-8 are replaced.
 std::string dump(const nlohmann::json& value);
+
+// "parse error at line 3, column 1: …": why it is no JSON.
+std::string fault_of(const nlohmann::json::exception& error);
 
 }  // namespace base

@@ -14,6 +14,7 @@
 #include "server/link/robot_listener.hpp"
 #include "server/live/live_feed.hpp"
 #include "server/net/transport_security.hpp"
+#include "server/runtime/exceptions.hpp"
 #include "server/runtime/log.hpp"
 #include "server/runtime/real_time.hpp"
 #include "server/station/models/model_sender.hpp"
@@ -23,8 +24,7 @@ using namespace server;  // NOLINT: this file is the station, seen from outside
 static int serve(const config::Config& config) {
   runtime::start_log(config.log_level, config.log_format);
   config::DataFolder folder{config.data_dir};
-  // The ground everything stands on; declared first, destroyed last.
-  boost::asio::io_context loop{1};  // all sockets, all live state
+  boost::asio::io_context loop{1};  // all sockets, all live state; everything stands on it: it is destroyed last
   runtime::SystemClock clock{loop};
   runtime::WorkerThread disk{"disk"}, checkpoints{"checkpoints"};
   runtime::WorkerThread readers{"readers", 10}, exports{"exports", 10}, maths{"maths", 10};
@@ -75,6 +75,6 @@ int main(int argc, char** argv) try {
   if (const auto exit_code = cli::answer(line)) return *exit_code;
   return serve(load_config(std::get<cli::Serve>(line).flags));
 } catch (const std::exception& error) {
-  fmt::print(stderr, "rheonaut: {}\n", cli::one_line(error.what()));
+  fmt::print(stderr, "rheonaut: {}\n", cli::one_line(runtime::text_of(error)));
   return EXIT_FAILURE;
 }

@@ -1,5 +1,4 @@
-// The program rheonaut-sim: simulated robots that dial a station, scenarios, the prediction of an experiment, the
-// pump's profile, a bad network.
+// The program rheonaut-sim: simulated robots, scenarios, predictions of experiments, a pump's profile, a bad network.
 #include <CLI/CLI.hpp>
 #include <csignal>
 #include <iostream>
@@ -7,6 +6,7 @@
 #include "base/command_line/help.hpp"
 #include "base/command_line/reference_flags.hpp"
 #include "base/command_line/suggestion.hpp"
+#include "base/failures/words.hpp"
 #include "base/version.hpp"
 #include "sim_robot/cli/flow_command.hpp"
 #include "sim_robot/cli/play_command.hpp"
@@ -75,6 +75,6 @@ int main(int argc, char** argv) try {
     return base::command_line::kUsageError;
   }
 } catch (const std::exception& error) {
-  std::cerr << "rheonaut-sim: " << error.what() << '\n';
+  std::cerr << "rheonaut-sim: " << base::failures::words_of(error) << '\n';
   return EXIT_FAILURE;
 }

@@ -4,6 +4,7 @@
 Usage: check_rules.py [ROOT]. CONTRIBUTING.md says why the rules are what they are; check_rules_test.py shows for each
 one a snippet that breaks it.
 """
+# LONG: one list of rules.
 import pathlib
 import re
 import sys
@@ -27,7 +28,7 @@ MAY_INCLUDE = {
 # Rooms from the lowest to the highest: each may include those before it, if its CMakeLists.txt says that it uses them.
 # ARCHITECTURE.md lists them in this order. server/main.cpp and sim_robot/main.cpp stand above all.
 ROOMS = """
-base base/command_line base/tls
+base base/command_line base/failures base/tls
 control/models control/responses control/sensor control/search control/identification control/discretisation
 control/tuning sim_robot/world sim_robot/robot sim_robot/network sim_robot/faults sim_robot/scenario sim_robot/lab
 sim_robot/client sim_robot/fleet sim_robot/proxy sim_robot/cli
@@ -52,6 +53,7 @@ MOST_FILES_IN_A_ROOM = 26  # .cpp and .hpp
 # Libraries that a folder must not see (beginnings of <...>).
 FOREIGN = {
     "base": ("boost/", "Eigen/", "spdlog/", "SQLiteCpp/", "pb"),
+    "base/failures": ("Eigen/", "spdlog/", "SQLiteCpp/", "pb"),  # it names the causes of Asio and Beast
     "protocol": ("boost/", "Eigen/", "nlohmann/", "spdlog/", "SQLiteCpp/"),
     "control": ("boost/", "nlohmann/", "spdlog/", "SQLiteCpp/", "pb"),
     "robot_fw/core": ("boost/", "Eigen/", "nlohmann/", "spdlog/", "SQLiteCpp/", "Arduino", "ESP8266", "Wire", "WiFi"),
@@ -123,10 +125,9 @@ def uses_of(root, room):
 def room_fault(source, target):
     """Why a room may not include this header of another, or nothing."""
     own, other = room_of(source.name), room_of(target)
-    if not own:
-        return f"{source.name.rpartition('/')[0]}/ is not in ROOMS of check_rules.py"
-    if not other:
-        return f"{target.rpartition('/')[0]}/ is not in ROOMS of check_rules.py"
+    for name, room in ((source.name, own), (target, other)):
+        if not room:
+            return f"{name.rpartition('/')[0]}/ is not in ROOMS of check_rules.py"
     if own == other:
         return None
     if ROOMS.index(other) > ROOMS.index(own):
@@ -162,7 +163,7 @@ def check_includes(source):
                 if fault:
                     yield line, fault
         elif not quoted:
-            if target.startswith(FOREIGN.get(folder, ()) + FOREIGN.get(area, ())):
+            if target.startswith(FOREIGN.get(area, FOREIGN.get(folder, ()))):
                 yield line, f"{folder}/ does not use <{target}>"
             if area in ("robot_fw/core", "robot_fw/esp8266") or folder == "protocol":
                 if target in NOT_ON_THE_ROBOT:
@@ -301,6 +302,17 @@ def check_secrets(source):
         yield source.line_of(match.start()), "compare with same() or find_secret() of server/runtime/secrets.hpp"
 
 
+def check_words(source):
+    """words: the text of a library's exception is shown to nobody; Rheonaut's own ones are words for a person."""
+    if not source.is_cpp or source.parts[0] not in ("server", "sim_robot") or source.name == "server/runtime/exceptions.cpp":
+        return
+    caught = ""
+    for number, line in enumerate(source.code.splitlines(), 1):
+        caught = (re.findall(r"catch \(const ([\w:]+)&", line) or [caught])[-1]
+        if ".what()" in line and caught not in ("std::invalid_argument", "UsageError", "NotOurs"):
+            yield number, "say runtime::text_of(error), or base::failures::words_of(error), instead of what()"
+
+
 def check_size(source):
     """size: files stay readable in one sitting."""
     count = len(source.lines)
@@ -367,7 +379,7 @@ def check_first_line(source):
 
 
 RULES = (check_includes, check_seams, check_links, check_room, check_co_await, check_tasks, check_clock, check_threads,
-         check_secrets, check_size, check_names, check_text, check_first_line)
+         check_secrets, check_words, check_size, check_names, check_text, check_first_line)
 
 
 def sources(root):

@@ -13,6 +13,7 @@
 #include "server/analysis/csv_columns.hpp"
 #include "server/analysis/optional_json.hpp"
 #include "server/analysis/reference_unit.hpp"
+#include "server/runtime/exceptions.hpp"
 #include "server/runtime/sha256.hpp"
 
 namespace server::analysis {
@@ -72,7 +73,7 @@ Result<Given> read_given(const ReferenceRequest& request) {
     given.position_m = std::move(columns.at("position_m"));
     if (const auto sd = columns.find("position_sd_m"); sd != columns.end()) given.sd_m = std::move(sd->second);
   } catch (const std::runtime_error& error) {
-    return fail(ErrorCode::invalid, error.what(), "malformed_csv");
+    return fail(ErrorCode::invalid, runtime::text_of(error), "malformed_csv");
   }
   if (given.time_s.size() > kMaxReferenceRows) {
     return fail(ErrorCode::invalid, fmt::format("{} has more than {} rows", request.source, kMaxReferenceRows),

@@ -10,6 +10,7 @@
 #include <fstream>
 #include <stdexcept>
 
+#include "server/runtime/exceptions.hpp"
 #include "server/storage/export/csv_writer.hpp"
 #include "server/storage/export/mat/mat_writer.hpp"
 #include "server/storage/export/mcap/mcap_writer.hpp"
@@ -135,10 +136,8 @@ Result<void> write_export(const storage::ExportOrder& order,
       return write_in(database, uri, order, std::move(spans), std::move(reports));
     } catch (const SQLite::Exception& error) {
       if (!is_of_writing(error)) throw;
-      return fail(
-          ErrorCode::unavailable,
-          fmt::format("cannot write {}: SQLite says '{}'; is the disk full?", order.file.string(), error.what()),
-          "low_space");
+      return fail(ErrorCode::unavailable,
+                  fmt::format("cannot write {}: {}", order.file.string(), runtime::text_of(error)), "low_space");
     }
   };
   return storage::read_store(order.database, write);

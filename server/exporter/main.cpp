@@ -12,6 +12,7 @@
 
 #include "base/version.hpp"
 #include "server/exporter/export_work.hpp"
+#include "server/runtime/exceptions.hpp"
 
 using namespace server;  // NOLINT: this file is the program, seen from outside
 
@@ -51,6 +52,6 @@ int main(int argc, char** argv) try {
   written ? tell(storage::ExportDone{}) : tell(written.error());
   return written ? EXIT_SUCCESS : EXIT_FAILURE;
 } catch (const std::exception& error) {
-  tell(Error{ErrorCode::unavailable, error.what(), "export_failed"});
+  tell(Error{ErrorCode::unavailable, runtime::text_of(error), "export_failed"});
   return EXIT_FAILURE;
 }

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 
+#include "server/runtime/exceptions.hpp"
 #include "server/storage/database/database.hpp"
 
 namespace server::identity {
@@ -58,7 +59,7 @@ asio::awaitable<std::invoke_result_t<Job, AccountStore&>> Accounts::on_store(Job
       AccountStore store{database.handle()};
       return job(store);
     } catch (const SQLite::Exception& error) {
-      spdlog::error("accounts: {}", error.what());
+      spdlog::error("accounts: {}", runtime::text_of(error));
       return fail(ErrorCode::unavailable, "the station's disk cannot store it now; its log says why", "not_stored");
     }
   };

@@ -46,7 +46,7 @@ RobotSession::~RobotSession() {
   try {
     station_.on_disconnected(*this, "the station stops");
   } catch (const std::exception& error) {
-    spdlog::error("robot '{}': {}", robot_id_, error.what());
+    spdlog::error("robot '{}': {}", robot_id_, runtime::text_of(error));
   }
 }
 

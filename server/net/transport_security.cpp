@@ -9,6 +9,8 @@
 #include <stdexcept>
 #include <utility>
 
+#include "server/runtime/exceptions.hpp"
+
 namespace server::net {
 namespace fs = std::filesystem;
 namespace asio = boost::asio;
@@ -108,7 +110,7 @@ TransportSecurity::FileCheck TransportSecurity::check(const fs::path& certificat
   try {
     found.context = tls::load_tls_context(certificate, key);
   } catch (const std::exception& error) {
-    found.problem = error.what();
+    found.problem = runtime::text_of(error);
   }
   return found;
 }

@@ -1,12 +1,17 @@
 // Looks into exceptions, and writes them down.
 #include "server/runtime/exceptions.hpp"
 
+#include <SQLiteCpp/Exception.h>
+#include <fmt/format.h>
 #include <spdlog/spdlog.h>
+#include <sqlite3.h>
 
 #include <boost/asio/error.hpp>
 #include <boost/asio/multiple_exceptions.hpp>
 #include <boost/system/system_error.hpp>
 #include <utility>
+
+#include "base/failures/words.hpp"
 
 namespace server::runtime {
 namespace asio = boost::asio;
@@ -72,11 +77,42 @@ bool is_cancellation(const std::exception_ptr& failure) {
   }
 }
 
+namespace {
+
+// Null where only SQLite's own text says what it was: such as a statement that this file cannot carry out.
+const char* words_of_sqlite(int code) {
+  switch (code) {
+    case SQLITE_FULL: return "the disk is full";
+    case SQLITE_IOERR: return "the disk does not read or write";
+    case SQLITE_CORRUPT: return "the file is damaged";
+    case SQLITE_NOTADB: return "the file is damaged, or no database";
+    case SQLITE_BUSY:
+    case SQLITE_LOCKED: return "another program holds the file";
+    case SQLITE_READONLY: return "the file may only be read";
+    case SQLITE_CANTOPEN: return "the file cannot be opened";
+    case SQLITE_NOMEM: return "no memory is left";
+    case SQLITE_INTERRUPT: return "it was cancelled";
+    default: return nullptr;
+  }
+}
+
+}  // namespace
+
+std::string text_of(const std::exception& failure) {
+  const auto* of_sqlite = dynamic_cast<const SQLite::Exception*>(&failure);
+  if (of_sqlite == nullptr) return base::failures::words_of(failure);
+  const int code = of_sqlite->getExtendedErrorCode();
+  const char* words = code == SQLITE_IOERR_WRITE ? "the disk takes no more: it is full, or fails"
+                                                 : words_of_sqlite(of_sqlite->getErrorCode());
+  return words != nullptr ? fmt::format("{} (SQLite {})", words, code)
+                          : fmt::format("SQLite says '{}' (code {})", failure.what(), code);
+}
+
 std::string text_of(const std::exception_ptr& failure) {
   try {
     std::rethrow_exception(failure);
   } catch (const std::exception& error) {
-    return error.what();
+    return text_of(error);
   } catch (...) {
     return "something that is no exception was thrown";
   }

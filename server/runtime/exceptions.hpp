@@ -52,6 +52,9 @@ boost::asio::awaitable<void> contained(ExceptionLog& log, const Clock& clock, En
 std::exception_ptr first_of(std::exception_ptr failure);
 
 bool is_cancellation(const std::exception_ptr& failure);
+
+// What went wrong, in words for a person (base/failures/words.hpp), also of SQLite: "the disk is full (SQLite 13)".
+std::string text_of(const std::exception& failure);
 std::string text_of(const std::exception_ptr& failure);
 
 }  // namespace server::runtime

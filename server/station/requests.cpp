@@ -7,6 +7,7 @@
 #include <set>
 #include <utility>
 
+#include "server/runtime/exceptions.hpp"
 #include "server/station/command_dispatch.hpp"
 #include "server/station/commands/command_checks.hpp"
 #include "server/station/state/audit_details.hpp"
@@ -34,7 +35,7 @@ void publish_stops(SinkNotifier& notifier, const RobotTable& robots, const std::
       notifier.publish(record);
       if (published.insert(record.robot_id).second) notifier.publish(robots.states().at(record.robot_id));
     } catch (const std::exception& error) {
-      spdlog::error("emergency stop of robot '{}': {}", record.robot_id, error.what());
+      spdlog::error("emergency stop of robot '{}': {}", record.robot_id, runtime::text_of(error));
       if (std::ranges::find(failed, record.robot_id) == failed.end()) failed.push_back(record.robot_id);
     }
   }
@@ -74,7 +75,7 @@ class RecordsAtTheEnd {
     try {
       parts_.record_waiting(true);
     } catch (const std::exception& error) {
-      spdlog::error("what was left out of the record was not counted in it: {}", error.what());
+      spdlog::error("what was left out of the record was not counted in it: {}", runtime::text_of(error));
     }
   }
   RecordsAtTheEnd(const RecordsAtTheEnd&) = delete;
@@ -154,7 +155,7 @@ asio::awaitable<StopsOfAll> Station::stop_all(StopRequest request, microseconds 
       if (const auto same = parts_->stops.stop_in_force(entry, request)) again.push_back(same->record);
       stops.emplace_back(parts_->stops.begin(entry, request, records), entry.link != nullptr);
     } catch (const std::exception& error) {  // SAFETY: the others are stopped all the same
-      spdlog::error("emergency stop of robot '{}': {}", id, error.what());
+      spdlog::error("emergency stop of robot '{}': {}", id, runtime::text_of(error));
       outcome.failed.push_back(id);
     }
   }
@@ -163,7 +164,7 @@ asio::awaitable<StopsOfAll> Station::stop_all(StopRequest request, microseconds 
     try {
       publish_stop_again(*parts_, request, record);
     } catch (const std::exception& error) {
-      spdlog::error("emergency stop of robot '{}' again: {}", record.robot_id, error.what());
+      spdlog::error("emergency stop of robot '{}' again: {}", record.robot_id, runtime::text_of(error));
     }
   }
   spdlog::warn("emergency stop of all {} robots by {}; {} retired ones are not connected and left out", stops.size(),

@@ -252,7 +252,7 @@ class ExampleRobotTest(unittest.TestCase):
             self.assertIsNone(station.get(f"/api/v1/robots/cart-1/{part}")[content])
         self.verified("set_duty", duty=0.3)
         self.assertEqual(self.refusal("set_mode", mode="auto", setpoint_m=0.1), "unsupported")
-        self.assertIn("is aborted: zero_position: rejected unsupported", self.experiment().stdout)
+        self.assertIn("is aborted: zero_position: rejected unsupported", self.experiment().stderr)
         stopped = self.stopped()
         self.verified("clear_emergency", emergency_id=self.robot()["emergency_id"])
         self.verified("set_mode", mode="manual")

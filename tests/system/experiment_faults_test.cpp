@@ -75,7 +75,7 @@ TEST_F(WriterTest, WhatNoDiskTakesIsNotTriedAgainAndKeepsNothing) {
   ask("second", [](storage::Database&) {});
   clock.run_for(100ms);
   ASSERT_EQ(done_.size(), 2U);
-  EXPECT_EQ(done_[0], "first cannot be stored: UNIQUE");
+  EXPECT_EQ(done_[0], "first cannot be stored: SQLite says 'UNIQUE' (code -1)");
   EXPECT_EQ(done_[1], "second");
 }
 

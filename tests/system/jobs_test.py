@@ -97,7 +97,7 @@ class JobsTest(unittest.TestCase):
             self.assertEqual(cancelled.returncode, 0, cancelled.stderr)
             wait_until(lambda: self.jobs(station)[0]["state"] == "done", 60, "the newest job's end")
             shown = place.tool("job", "show", 2, "--wait", "--data", place.data)
-            self.assertEqual((shown.returncode, shown.stdout), (5, "job 2 cancelled\n"), shown.stderr)
+            self.assertEqual((shown.returncode, shown.stdout, shown.stderr), (5, "", "rheonaut: job 2 cancelled\n"))
             self.assertIsNone(station.get("/api/v1/jobs/2")["result"])
 
 

@@ -71,7 +71,7 @@ class KillTest(unittest.TestCase):
         connection.close()
         found = verify("--data", place.data)
         self.assertEqual(found.returncode, 1)
-        self.assertEqual(found.stderr, "")
+        self.assertRegex(found.stderr, r"^rheonaut: \S+: \d+ faults found\n$")
         self.assertRegex(found.stdout, rf"fault: run {run_id}: its samples were changed")
         self.assertEqual(verify("--file", database, "--run", run_id).returncode, 1)
 

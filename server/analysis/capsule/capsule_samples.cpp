@@ -4,6 +4,7 @@
 #include <SQLiteCpp/SQLiteCpp.h>
 #include <fmt/format.h>
 
+#include "server/runtime/exceptions.hpp"
 #include "server/storage/export/run_file.hpp"
 #include "server/storage/query/run_reader.hpp"
 
@@ -26,7 +27,7 @@ Result<CapsuleSamples> read_capsule_samples(const std::filesystem::path& file, s
     SQLite::Database database{storage::reading_uri(file, true), SQLite::OPEN_READONLY | SQLite::OPEN_URI};
     return read_all(database, limit);
   } catch (const SQLite::Exception& error) {
-    return fail(ErrorCode::invalid, fmt::format("cannot read samples.sqlite: SQLite says '{}'", error.what()));
+    return fail(ErrorCode::invalid, fmt::format("cannot read samples.sqlite: {}", runtime::text_of(error)));
   }
 }
 

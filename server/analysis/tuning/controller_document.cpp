@@ -6,6 +6,8 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "server/runtime/exceptions.hpp"
+
 namespace server::analysis {
 namespace {
 
@@ -50,7 +52,8 @@ Result<nlohmann::json> sections_of(const nlohmann::json& document, double period
     const auto made = discretised(*controller, sampling_for(period_s, is_one_way));
     return what_is_sent(nlohmann::json(discretised_json(made)));
   } catch (const std::exception& error) {
-    return fail(ErrorCode::invalid, fmt::format("it cannot be discretised: {}", error.what()), "no_controller");
+    return fail(ErrorCode::invalid, fmt::format("it cannot be discretised: {}", runtime::text_of(error)),
+                "no_controller");
   }
 }
 

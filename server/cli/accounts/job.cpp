@@ -73,16 +73,12 @@ json wait_for(const JobCommand& options, std::int64_t id) {
 // Of an ended job with its result; the result alone is what the tools read.
 int write_ended(const JobCommand& options, const json& job, std::ostream& out) {
   const auto state = job.at("state").get<std::string>();
-  if (options.json) {
-    fmt::print(out, "{}\n", job.dump(2));
-  } else if (state == "done") {
-    fmt::print(out, "{}\n", job.at("result").dump(2));
-  } else {
-    const json& error = job.at("error");
-    fmt::print(out, "job {} {}{}\n", job.at("job_id").get<std::int64_t>(), state,
-               error.is_null() ? "" : ": " + error.get<std::string>());
-  }
-  return state == "done" ? 0 : kJobNotDone;
+  const bool is_done = state == "done";
+  if (options.json || is_done) fmt::print(out, "{}\n", (options.json ? job : job.at("result")).dump(2));
+  if (is_done) return 0;
+  const json& error = job.at("error");
+  return not_done(kJobNotDone, fmt::format("job {} {}{}", job.at("job_id").get<std::int64_t>(), state,
+                                           error.is_null() ? "" : ": " + error.get<std::string>()));
 }
 
 void write_jobs(std::ostream& out, const json& jobs) {

@@ -54,10 +54,10 @@ int print_outcome(const json& record, const std::string& what, bool as_json, std
     fmt::print(out, "{}\n", record.dump(2));
   } else if (is_verified) {
     fmt::print(out, "{}: verified, the robot says it back bit for bit\n", what);
-  } else {
-    fmt::print(out, "{}: accepted by the robot, but not verified ({})\n", what, record.at("reason").get<std::string>());
   }
-  return is_verified ? 0 : kNotVerified;
+  return is_verified ? 0
+                     : not_done(kNotVerified, fmt::format("{}: accepted by the robot, but not verified ({})", what,
+                                                          record.at("reason").get<std::string>()));
 }
 
 std::string number(const json& value) { return value.is_null() ? "-" : value.dump(); }
@@ -177,11 +177,10 @@ int push_design(const Robot& robot, const RobotSettingsCommand& options, std::os
   json body{{"design_id", *options.design}};
   add_how(options, body);
   const json pushed = robot.post("/controller", body);
-  if (options.json) {
-    fmt::print(out, "{}\n", pushed.dump(2));
-    return pushed.at("verified").get<bool>() ? 0 : kNotVerified;
-  }
-  return print_outcome(pushed.at("command"), fmt::format("controller of design {}", *options.design), false, out);
+  const std::string what = fmt::format("controller of design {}", *options.design);
+  if (!options.json) return print_outcome(pushed.at("command"), what, false, out);
+  fmt::print(out, "{}\n", pushed.dump(2));
+  return pushed.at("verified").get<bool>() ? 0 : not_done(kNotVerified, what + ": not verified");
 }
 
 int restore_controller(const Robot& robot, const RobotSettingsCommand& options, std::ostream& out) {

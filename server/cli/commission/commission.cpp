@@ -13,6 +13,7 @@
 #include "server/cli/terminal/exit_status.hpp"
 #include "server/cli/terminal/options.hpp"
 #include "server/runtime/clock.hpp"
+#include "server/runtime/exceptions.hpp"
 
 namespace server::cli {
 namespace {
@@ -117,10 +118,10 @@ int run(const Commission& options, std::ostream& out) {
   } catch (const std::exception& error) {
     // What was found is not lost with the disk.
     record.signed_by.clear();
-    record.unsigned_because = fmt::format("it could not be written: {}", error.what());
+    record.unsigned_because = fmt::format("it could not be written: {}", runtime::text_of(error));
     person.tell("The record could not be written: keep what is printed here.");
     write_json(out, document_of(record));
-    return kNotSigned;
+    return not_done(kNotSigned, "the record is not signed: " + record.unsigned_because);
   }
   std::string not_marked;
   if (!record.signed_by.empty()) {
@@ -132,7 +133,7 @@ int run(const Commission& options, std::ostream& out) {
   } else {
     write_as_text(out, record, written, not_marked);
   }
-  return record.signed_by.empty() ? kNotSigned : 0;
+  return record.signed_by.empty() ? not_done(kNotSigned, "the record is not signed: " + record.unsigned_because) : 0;
 }
 
 }  // namespace server::cli

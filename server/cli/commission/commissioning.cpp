@@ -7,6 +7,7 @@
 #include <array>
 #include <stdexcept>
 
+#include "base/failures/words.hpp"
 #include "base/version.hpp"
 
 namespace server::cli {
@@ -58,7 +59,7 @@ class Control {
 };
 
 // Somebody else drives the robot: it must not be stopped for our sake.
-struct NotOurs : std::runtime_error {
+struct NotOurs : std::runtime_error, base::failures::Worded {
   using runtime_error::runtime_error;
 };
 
@@ -148,12 +149,12 @@ void Commissioning::prove_stops() {
       throw std::runtime_error{"it no longer rests in manual"};
     }
   } catch (const std::exception& error) {
-    throw NotOurs{fmt::format("somebody else has the robot: {}", error.what())};
+    throw NotOurs{fmt::format("somebody else has the robot: {}", runtime::text_of(error))};
   }
   try {
     for (int i = 0; i < kStops; ++i) stop_and_reset();
   } catch (const std::exception& error) {
-    stops_.not_confirmed = error.what();
+    stops_.not_confirmed = runtime::text_of(error);
     add(judge_stops(stops_));
     throw std::runtime_error{"the stops are not proved, so the motor must not run"};
   }
@@ -289,7 +290,7 @@ void Commissioning::run() {
   } catch (const Declined&) {
     end_early("the person did not go on");
   } catch (const std::exception& error) {
-    end_early(error.what());
+    end_early(runtime::text_of(error));
   }
   complete();
 }

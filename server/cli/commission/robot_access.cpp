@@ -10,6 +10,7 @@
 #include "server/cli/commission/plan.hpp"
 #include "server/cli/experiments/station_work.hpp"
 #include "server/runtime/clock.hpp"
+#include "server/runtime/exceptions.hpp"
 
 namespace server::cli {
 namespace {
@@ -132,7 +133,7 @@ StopAnswer RobotAccess::stop() const {
   try {
     answer = client_.ask_at_once({{"POST", path_ + "/emergency-stop"}}, kStopPatience).front();
   } catch (const std::exception& error) {
-    outcome.why = error.what();
+    outcome.why = runtime::text_of(error);
     return outcome;
   }
   const json record = answer.body.is_object() ? answer.body : json::object();
@@ -304,7 +305,7 @@ std::string RobotAccess::mark(const std::string& line) const {
     if (answer.status != 0 && answer.status < kFirstProblem) return {};
     return answer.status == 0 ? answer.text : text_or(answer.body, "detail", "refused");
   } catch (const std::exception& error) {  // a name that is no UTF-8; the record is signed already
-    return error.what();
+    return runtime::text_of(error);
   }
 }
 

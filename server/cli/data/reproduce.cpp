@@ -117,7 +117,8 @@ int run(const Reproduce& options, std::ostream& out) {
   } else {
     write_text(out, *found);
   }
-  return found->is_reproduced() ? 0 : kNotReproduced;
+  if (found->is_reproduced()) return 0;
+  return not_done(kNotReproduced, options.file.string() + ": a file is damaged, or a number differs");
 }
 
 }  // namespace server::cli

@@ -10,6 +10,7 @@
 
 #include "server/cli/terminal/options.hpp"
 #include "server/cli/terminal/progress.hpp"
+#include "server/runtime/exceptions.hpp"
 #include "server/storage/database/database.hpp"
 #include "server/storage/database/schema.hpp"
 #include "server/storage/export/run_file.hpp"
@@ -101,7 +102,7 @@ Result<Verified> verify_export(const std::filesystem::path& path, const Verify& 
     verified.audit = check_exported_audit(file, options.expected);
     return verified;
   } catch (const SQLite::Exception& error) {
-    return fail(ErrorCode::unavailable, fmt::format("cannot read {}: SQLite says '{}'", path.string(), error.what()));
+    return fail(ErrorCode::unavailable, fmt::format("cannot read {}: {}", path.string(), runtime::text_of(error)));
   }
 }
 
@@ -192,7 +193,9 @@ int run(const Verify& options, std::ostream& out) {
   } else {
     write_table(out, *verified, options);
   }
-  return verified->faults().empty() ? 0 : kFaults;
+  const std::size_t faults = verified->faults().size();
+  if (faults == 0) return 0;
+  return not_done(kFaults, fmt::format("{}: {} fault{} found", path.string(), faults, faults == 1 ? "" : "s"));
 }
 
 }  // namespace server::cli

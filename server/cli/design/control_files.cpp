@@ -14,6 +14,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "base/json_text.hpp"
 #include "control/search/missed_ticks.hpp"
 #include "server/analysis/control_json.hpp"
 #include "server/analysis/motion_at_start.hpp"
@@ -43,14 +44,11 @@ std::string read_text(const std::string& file, std::size_t max_bytes) {
   return text;
 }
 
-// nlohmann's messages begin with its own name in brackets and say line and column.
 nlohmann::json read_json(const std::string& file) {
   try {
     return nlohmann::json::parse(read_text(file, kMaxJsonBytes));
   } catch (const nlohmann::json::exception& error) {
-    const std::string what = error.what();
-    const std::size_t bracket = what.find("] ");
-    refuse(file, fmt::format("is not JSON: {}", bracket == std::string::npos ? what : what.substr(bracket + 2)));
+    refuse(file, "is not JSON: " + base::fault_of(error));
   }
 }
 

@@ -47,10 +47,8 @@ int run(const EstimatorQuestion& question, std::ostream& out) {
                "fit error {} % of the final velocity, from 10 ms to 60 s: the robot can use this model. It is in force "
                "once the robot is told, with model_confirmed = 1 in this fluid only.\n",
                fixed(100 * model.fit_error, 3));
-  } else {
-    fmt::print(out, "the robot cannot use a model of this plant: {}\n", model.reason);
   }
-  return model.is_met ? 0 : kInfeasible;
+  return model.is_met ? 0 : not_done(kInfeasible, "the robot cannot use a model of this plant: " + model.reason);
 }
 
 }  // namespace server::cli

@@ -318,7 +318,9 @@ int run(const Identify& options, std::ostream& out) {
     fmt::print(stderr, "rheonaut: warning: the model explains {} only; its parameters come from the other runs\n",
                fmt::join(unexplained, " and "));
   }
-  return found.best.end == control::SearchEnd::converged ? 0 : kNotConverged;
+  return found.best.end == control::SearchEnd::converged
+             ? 0
+             : not_done(kNotConverged, "the search did not converge; what is printed is the best that it found");
 }
 
 }  // namespace server::cli

@@ -260,7 +260,7 @@ int run(const ProfileQuestion& options, std::ostream& out) {
     write_table(out, profile, runs);
   }
   const bool is_sound = std::ranges::all_of(runs, [](const Predicted& each) { return each.preview.problems.empty(); });
-  return is_sound ? 0 : kHasProblems;
+  return is_sound ? 0 : not_done(kHasProblems, "a predicted run leaves the limits");
 }
 
 }  // namespace server::cli

@@ -206,12 +206,11 @@ int run(const Tune& options, std::ostream& out) {
     write_ranges(out, options, ranges);
     if (options.with_robustness) write_robustness(out, robustness_of(plant, result.tuned->controller));
   } else {
-    fmt::print(out, "not feasible: {}\n", result.reason);
     write_ranges(out, options, ranges);
     write_offers(out, "nearest", result.nearest);
     write_offers(out, "relaxed", result.relaxed);
   }
-  return result.is_feasible ? 0 : kInfeasible;
+  return result.is_feasible ? 0 : not_done(kInfeasible, "not feasible: " + result.reason);
 }
 
 }  // namespace server::cli

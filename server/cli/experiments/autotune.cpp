@@ -140,7 +140,12 @@ int run(const Autotune& options, const AskStation& ask, std::ostream& out, std::
   AutotuneChain chain{ask, request, state, progress};
   const AutotuneEnd end = chain.run();
   write_end(options, state, chain, end, out);
-  return end == AutotuneEnd::done ? 0 : end == AutotuneEnd::infeasible ? kNothingMeetsIt : kStageEnded;
+  switch (end) {
+    case AutotuneEnd::done: return 0;
+    case AutotuneEnd::infeasible: return not_done(kNothingMeetsIt, "no controller meets the specification");
+    case AutotuneEnd::stopped: break;
+  }
+  return not_done(kStageEnded, "autotune has stopped at a stage that did not end well");
 }
 
 int run(const Autotune& options, std::ostream& out) {

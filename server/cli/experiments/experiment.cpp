@@ -182,17 +182,20 @@ void write_knowledge(std::ostream& out, const json& experiment) {
 
 int write_one(const ExperimentCommand& options, const json& experiment, std::ostream& out) {
   const auto state = experiment.at("state").get<std::string>();
+  const bool is_done = !is_over(experiment) || state == "done";
+  const std::string why =
+      text_of(is_over(experiment) || state == "paused" ? experiment.at("detail") : experiment.at("waits_for_detail"));
+  const std::string outcome =
+      fmt::format("experiment {} ({}) is {}{}", experiment.at("experiment_id").get<std::int64_t>(),
+                  experiment.at("name").get<std::string>(), state, why.empty() ? "" : ": " + why);
   if (options.json) {
     fmt::print(out, "{}\n", experiment.dump(2));
   } else {
-    const std::string why =
-        text_of(is_over(experiment) || state == "paused" ? experiment.at("detail") : experiment.at("waits_for_detail"));
-    fmt::print(out, "experiment {} ({}) is {}{}\n", experiment.at("experiment_id").get<std::int64_t>(),
-               one_line(experiment.at("name").get<std::string>()), state, why.empty() ? "" : ": " + why);
+    if (is_done) fmt::print(out, "{}\n", one_line(outcome));
     if (!experiment.at("runs").empty()) write_runs(out, experiment);
     write_knowledge(out, experiment);
   }
-  return is_over(experiment) && state != "done" ? kExperimentNotDone : 0;
+  return is_done ? 0 : not_done(kExperimentNotDone, outcome);
 }
 
 int begin_experiment(const ExperimentCommand& options, std::ostream& out) {

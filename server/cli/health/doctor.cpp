@@ -11,7 +11,9 @@
 #include "server/cli/health/machine_checks.hpp"
 #include "server/cli/health/running_station.hpp"
 #include "server/cli/health/store_checks.hpp"
+#include "server/cli/terminal/exit_status.hpp"
 #include "server/cli/terminal/options.hpp"
+#include "server/runtime/exceptions.hpp"
 
 namespace server::cli {
 namespace {
@@ -23,7 +25,8 @@ config::Config read_config(const config::ConfigFlags& flags, Findings& findings)
     findings.fine("config", flags.file ? flags.file->string() + " is valid" : "no file was given: the defaults");
     return config;
   } catch (const std::exception& error) {
-    findings.problem("config", one_line(error.what()), "correct it; rheonaut check-config shows what it means then");
+    findings.problem("config", one_line(runtime::text_of(error)),
+                     "correct it; rheonaut check-config shows what it means then");
     config::Config defaults;
     if (flags.data_dir) defaults.data_dir = *flags.data_dir;
     return defaults;
@@ -61,11 +64,7 @@ void write_findings(std::ostream& out, const Findings& findings) {
     fmt::print(out, "{:<8} {:<12} {}\n", text(finding.grade), finding.topic, finding.what);
     if (!finding.action.empty()) fmt::print(out, "{:21} -> {}\n", "", finding.action);
   }
-  const std::size_t problems = findings.problems();
-  fmt::print(out, "{}\n",
-             problems == 0   ? "nothing is wrong"
-             : problems == 1 ? "1 thing is wrong"
-                             : fmt::format("{} things are wrong", problems));
+  if (findings.problems() == 0) fmt::print(out, "nothing is wrong\n");
 }
 
 nlohmann::ordered_json json_of(const Findings& findings) {
@@ -95,7 +94,9 @@ int run(const Doctor& options, std::ostream& out) {
   } else {
     write_findings(out, findings);
   }
-  return findings.problems() == 0 ? 0 : 1;
+  const std::size_t problems = findings.problems();
+  if (problems == 0) return 0;
+  return not_done(kFailed, problems == 1 ? "1 thing is wrong" : fmt::format("{} things are wrong", problems));
 }
 
 }  // namespace server::cli

@@ -12,6 +12,7 @@
 #include <optional>
 
 #include "server/config/endpoint.hpp"
+#include "server/runtime/exceptions.hpp"
 #include "server/tls/tls_certificate.hpp"
 
 namespace server::cli {
@@ -154,7 +155,7 @@ void check_certificate(const config::Config& config, std::int64_t now_us, Findin
     if (config.speaks_tls(config.http)) judge_names(config, certificate, of_file);
     judge_expiry(config, certificate, now_us, of_file);
   } catch (const std::exception& error) {  // the file is named in it
-    of_file.problem("certificate", error.what(),
+    of_file.problem("certificate", runtime::text_of(error),
                     "put a certificate and its key in PEM there, or make both anew: "
                     "rheonaut certificate");
   }

@@ -14,6 +14,7 @@
 #include "server/cli/health/listening_program.hpp"
 #include "server/cli/terminal/output.hpp"
 #include "server/config/endpoint.hpp"
+#include "server/runtime/exceptions.hpp"
 #include "server/storage/query/run_reader.hpp"
 
 namespace server::cli {
@@ -68,7 +69,7 @@ void ask(const std::filesystem::path& data_dir, RunningStation& running) {
     running.recording = answer_to("/api/v1/recording");
     running.robot_list = answer_to("/api/v1/robots");
   } catch (const std::exception& error) {  // not our token, or it has just ended
-    running.problem = error.what();
+    running.problem = runtime::text_of(error);
   }
 }
 

@@ -11,6 +11,7 @@
 
 #include "server/cli/terminal/output.hpp"
 #include "server/runtime/clock.hpp"
+#include "server/runtime/exceptions.hpp"
 #include "server/storage/database/file_check.hpp"
 #include "server/storage/database/schema.hpp"
 #include "server/storage/query/run_reader.hpp"
@@ -51,7 +52,7 @@ std::optional<std::string> damage_found_in_time(SQLite::Database& database) {
     damage = said == "ok" ? "" : said;
   } catch (const SQLite::Exception& error) {
     if (storage::means_damage(error)) {
-      damage = error.what();
+      damage = runtime::text_of(error);
     } else if (error.getErrorCode() != SQLITE_INTERRUPT) {
       throw;
     }

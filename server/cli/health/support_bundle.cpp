@@ -26,6 +26,7 @@
 #include "server/cli/health/running_station.hpp"
 #include "server/cli/terminal/options.hpp"
 #include "server/runtime/clock.hpp"
+#include "server/runtime/exceptions.hpp"
 #include "server/storage/database/finished_file.hpp"
 #include "server/storage/query/run_reader.hpp"
 
@@ -69,7 +70,7 @@ std::string or_reason(const std::function<std::string()>& gather) {
   try {
     return gather();
   } catch (const std::exception& error) {
-    return fmt::format("not gathered: {}\n", one_line(error.what()));
+    return fmt::format("not gathered: {}\n", one_line(runtime::text_of(error)));
   }
 }
 

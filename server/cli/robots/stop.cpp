@@ -6,10 +6,12 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <functional>
 #include <stdexcept>
 
 #include "server/cli/accounts/station_client.hpp"
 #include "server/cli/terminal/options.hpp"
+#include "server/runtime/exceptions.hpp"
 
 namespace server::cli {
 namespace {
@@ -23,8 +25,8 @@ constexpr microseconds kStopPatience{7'000'000};
 constexpr microseconds kExplanationPatience{1'000'000};
 constexpr std::size_t kMostExplained = 20;  // connections at once
 
-constexpr const char* kNothingStopped = "{}; NOTHING WAS STOPPED by this command: switch the robots off by hand";
-constexpr const char* kNotKnown = "{}; IT IS NOT KNOWN whether anything was stopped: switch the robots off by hand";
+constexpr const char* kNothingStopped = "NOTHING WAS STOPPED by this command: switch the robots off by hand; {}";
+constexpr const char* kNotKnown = "IT IS NOT KNOWN whether anything was stopped: switch the robots off by hand; {}";
 
 // SAFETY: a station that got the request may have stopped robots, also when its answer is lost or says that it failed.
 [[noreturn]] void throw_unanswered(const StationAnswer& answer, const std::string& why) {
@@ -165,7 +167,6 @@ void write_as_text(std::ostream& out, const std::vector<StopOutcome>& outcomes, 
                                                : "NOT CONFIRMED: " + one_line(one.why);
     fmt::print(out, "{:<{}}  {}\n", one_line(one.robot_id), width, said);
   }
-  if (outcomes.empty()) fmt::print(out, "this station knows no robot\n");
   fmt::print(out, "{} of {} robots confirmed; the station answered after {:.0f} ms\n",
              std::ranges::count_if(outcomes, &StopOutcome::is_confirmed), outcomes.size(),
              static_cast<double>(answered_after_us) / 1000);
@@ -180,11 +181,19 @@ void write_reasons(std::ostream& out, const std::vector<StopOutcome>& before, co
   }
 }
 
+int exit_code_of(const std::vector<StopOutcome>& outcomes) {
+  if (outcomes.empty()) return not_done(kNotConfirmed, "NOTHING WAS STOPPED: this station knows no robot");
+  const auto open = std::ranges::count_if(outcomes, std::not_fn(&StopOutcome::is_confirmed));
+  if (open == 0) return 0;
+  return not_done(kNotConfirmed, fmt::format("NOT CONFIRMED by {} of {} robots: switch off by hand those that move",
+                                             open, outcomes.size()));
+}
+
 StationClient client_of(const std::filesystem::path& data_dir) {
   try {
     return StationClient{data_dir};
   } catch (const std::exception& error) {
-    throw std::runtime_error{fmt::format(kNothingStopped, error.what())};
+    throw std::runtime_error{fmt::format(kNothingStopped, runtime::text_of(error))};
   }
 }
 
@@ -214,6 +223,7 @@ int run(const StopCommand& options, std::ostream& out) {
   const std::int64_t answered_after_us = clock.steady_us() - begun_us;
   std::ranges::sort(outcomes, {}, [](const StopOutcome& one) { return std::pair{!one.is_confirmed, one.robot_id}; });
   if (!options.form.is_json) write_as_text(out, outcomes, answered_after_us);
+  const int exit_code = exit_code_of(outcomes);  // said before it looks for reasons
   const std::vector<StopOutcome> written = outcomes;
   explain(station, outcomes);
   if (options.form.is_json) {
@@ -221,8 +231,7 @@ int run(const StopCommand& options, std::ostream& out) {
   } else {
     write_reasons(out, written, outcomes);
   }
-  const bool is_done = !outcomes.empty() && std::ranges::all_of(outcomes, &StopOutcome::is_confirmed);
-  return is_done ? 0 : kNotConfirmed;
+  return exit_code;
 }
 
 }  // namespace server::cli

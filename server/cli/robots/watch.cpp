@@ -18,6 +18,7 @@
 
 #include "server/cli/accounts/station_client.hpp"
 #include "server/cli/terminal/options.hpp"
+#include "server/runtime/exceptions.hpp"
 
 namespace server::cli {
 namespace {
@@ -183,7 +184,7 @@ class Watch {
       unknown_ = unknown_of(robots, options_.robots);
       problem_.clear();
     } catch (const std::exception& error) {
-      problem_ = error.what();
+      problem_ = runtime::text_of(error);
     }
     return problem_.empty();
   }

@@ -3,6 +3,8 @@
 
 #include <stdexcept>
 
+#include "base/failures/words.hpp"
+
 namespace server::cli {
 
 struct ExitStatus {
@@ -33,7 +35,7 @@ inline constexpr ExitStatus kExitStatuses[] = {
 };
 
 // Options that do not go together, or a value that another option makes impossible: exit status 2.
-class UsageError : public std::runtime_error {
+class UsageError : public std::runtime_error, public base::failures::Worded {
  public:
   using std::runtime_error::runtime_error;
 };

@@ -86,6 +86,11 @@ std::string fixed(double value, int decimals) {
 
 std::string cell(const std::optional<double>& value, int digits) { return value ? cell(*value, digits) : "-"; }
 
+int not_done(int exit_status, std::string_view outcome) {
+  fmt::print(stderr, "rheonaut: {}\n", one_line(outcome));
+  return exit_status;
+}
+
 std::string one_line(std::string_view text) {
   std::string shown;
   for (const char c : text) {

@@ -45,6 +45,10 @@ class Table {
   std::vector<std::vector<std::string>> rows_;
 };
 
+// An outcome that is not success: says it in one line on standard error, beside whatever the answer is, and returns the
+// exit status.
+int not_done(int exit_status, std::string_view outcome);
+
 // For messages: what a terminal would obey, or what would break the line, as \xNN.
 std::string one_line(std::string_view text);
 

@@ -1,6 +1,7 @@
 #include "server/experiments/adaptive/fitted_model.hpp"
 
 #include "server/analysis/control_json.hpp"
+#include "server/runtime/exceptions.hpp"
 
 namespace server::experiments {
 using nlohmann::json;
@@ -31,7 +32,8 @@ Result<FittedModel> fitted_model_from(storage::JobId job, const json& result) {
     }
     return fitted;
   } catch (const json::exception& error) {
-    return fail(ErrorCode::invalid, std::string{"the result of the fit cannot be read: "} + error.what(), "no_model");
+    return fail(ErrorCode::invalid, std::string{"the result of the fit cannot be read: "} + runtime::text_of(error),
+                "no_model");
   }
 }
 

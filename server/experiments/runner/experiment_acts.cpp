@@ -7,6 +7,7 @@
 #include "server/experiments/runner/experiments.hpp"
 #include "server/experiments/runner/limits_check.hpp"
 #include "server/runtime/counted.hpp"
+#include "server/runtime/exceptions.hpp"
 #include "server/station/state/audit_note.hpp"
 #include "server/storage/experiments/experiment_store.hpp"
 
@@ -109,7 +110,7 @@ asio::awaitable<Result<ExperimentView>> Experiments::begin(storage::ExperimentRe
       storage::add_experiment(database, experiment, note);
       return {};
     } catch (const SQLite::Exception& error) {
-      return fail(ErrorCode::unavailable, fmt::format("it could not be stored: {}; try again", error.what()),
+      return fail(ErrorCode::unavailable, fmt::format("it could not be stored: {}; try again", runtime::text_of(error)),
                   "not_stored");
     }
   };

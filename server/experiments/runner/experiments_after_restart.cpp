@@ -4,6 +4,7 @@
 
 #include "server/experiments/profile_document.hpp"
 #include "server/experiments/runner/experiments.hpp"
+#include "server/runtime/exceptions.hpp"
 #include "server/storage/experiments/experiment_store.hpp"
 
 namespace server::experiments {
@@ -40,7 +41,7 @@ asio::awaitable<void> Experiments::load() {
         auto robots = storage::interrupt_experiments(database, utc_us);
         return Left{std::move(robots), storage::waiting_experiments(database.handle())};
       } catch (const SQLite::Exception& error) {
-        spdlog::error("the experiments cannot be read: {}; it is tried again", error.what());
+        spdlog::error("the experiments cannot be read: {}; it is tried again", runtime::text_of(error));
         return std::nullopt;
       }
     };

@@ -6,6 +6,8 @@
 #include <chrono>
 #include <stdexcept>
 
+#include "server/runtime/exceptions.hpp"
+
 namespace server::experiments {
 namespace {
 
@@ -61,7 +63,7 @@ boost::asio::awaitable<void> StubbornWriter::keep(std::string what, std::functio
         change(database);
         return {};
       } catch (const SQLite::Exception& error) {
-        return {error.what(), may_pass(error)};
+        return {runtime::text_of(error), may_pass(error)};
       }
     };
     const Outcome outcome = co_await recorder_.on_disk(std::move(job));

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 
+#include "server/runtime/exceptions.hpp"
 #include "server/runtime/secrets.hpp"
 #include "server/station/state/unknown_values.hpp"
 #include "server/storage/audit/audit_chain.hpp"
@@ -130,7 +131,7 @@ std::vector<AdmissionOutcome> BootStore::admit(const std::vector<AdmissionQuesti
     try {
       outcomes.push_back(admit_together({&question, 1}, enrolment).front());
     } catch (const std::exception& error) {
-      spdlog::error("a robot cannot be admitted now: {}", error.what());
+      spdlog::error("a robot cannot be admitted now: {}", runtime::text_of(error));
       outcomes.push_back({refusal(rheonaut_REFUSAL_REASON_STATION_BUSY,
                                   "the station's database cannot be used now; its log says why; try again"),
                           {}});

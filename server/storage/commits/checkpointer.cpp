@@ -5,6 +5,8 @@
 #include <spdlog/spdlog.h>
 #include <sqlite3.h>
 
+#include "server/runtime/exceptions.hpp"
+
 namespace server::storage {
 namespace asio = boost::asio;
 using namespace std::chrono_literals;
@@ -29,7 +31,7 @@ CheckpointOutcome make_pass(const std::filesystem::path& path) {
     database.execAndGet("SELECT value FROM meta").getInt64();  // opens the log
     return checkpoint(database, CheckpointMode::passive);
   } catch (const std::exception& error) {
-    return {.log_frames = 0, .moved_frames = 0, .is_busy = false, .problem = error.what()};
+    return {.log_frames = 0, .moved_frames = 0, .is_busy = false, .problem = runtime::text_of(error)};
   }
 }
 
@@ -169,8 +171,8 @@ void Checkpointer::watch() {
     return;
   }
   warned_at_us_ = now_us;
-  const std::string cause = problem_.empty() ? "another program holds a read transaction on it; end that program"
-                                             : fmt::format("SQLite says '{}'", problem_);
+  const std::string cause =
+      problem_.empty() ? "another program holds a read transaction on it; end that program" : problem_;
   spdlog::warn("the write-ahead log of {} has grown to {} MB and cannot begin anew: {}", path_.string(),
                state_.bytes >> 20U, cause);
 }

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include "server/runtime/exceptions.hpp"
 #include "server/storage/database/disk_reserve.hpp"
 #include "server/storage/database/file_check.hpp"
 #include "server/storage/samples/stored_rows.hpp"
@@ -24,7 +25,7 @@ OpenedDatabase DatabaseWorker::open_now(std::int64_t utc_us) {
   try {
     end_unfinished_commands(*database_, utc_us);
   } catch (const SQLite::Exception& error) {  // SAFETY: with a full disk, too, robots come in and can be stopped
-    spdlog::warn("commands of an earlier start stay unfinished in the record: {}", error.what());
+    spdlog::warn("commands of an earlier start stay unfinished in the record: {}", runtime::text_of(error));
   }
   keep_disk_reserve(path_, std::filesystem::space(folder, unknown).available);
   BootStore boots{*database_};
@@ -58,12 +59,12 @@ void DatabaseWorker::close(const std::function<void(Database&, std::int64_t)>& l
     const AuditHead head = append_audit(database_->handle(), stopped);
     spdlog::info("audit: ends with {}", text(head));
   } catch (const std::exception& error) {
-    spdlog::warn("the last words of the audit could not be written: {}", error.what());
+    spdlog::warn("the last words of the audit could not be written: {}", runtime::text_of(error));
   }
   try {
     database_->checkpoint();
   } catch (const std::exception& error) {  // only the log stays longer: it is read at the next start
-    spdlog::warn("the write-ahead log of {} could not be emptied: {}", path_.string(), error.what());
+    spdlog::warn("the write-ahead log of {} could not be emptied: {}", path_.string(), runtime::text_of(error));
   }
   database_.reset();
 }

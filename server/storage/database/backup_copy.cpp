@@ -5,6 +5,7 @@
 
 #include <stdexcept>
 
+#include "server/runtime/exceptions.hpp"
 #include "server/storage/database/file_check.hpp"
 #include "server/storage/database/finished_file.hpp"
 
@@ -67,7 +68,7 @@ void back_up_closed(const std::filesystem::path& from, const std::filesystem::pa
     const std::string damage = find_damage(copy);
     if (!damage.empty()) fail_backup(from, "it is damaged: " + damage);
   } catch (const SQLite::Exception& error) {
-    fail_backup(from, fmt::format("SQLite says '{}'", error.what()));
+    fail_backup(from, runtime::text_of(error));
   }
   finish_file(draft.path(), to);
 }

@@ -9,6 +9,7 @@
 
 #include <stdexcept>
 
+#include "server/runtime/exceptions.hpp"
 #include "server/storage/database/file_check.hpp"
 #include "server/storage/database/migration_copy.hpp"
 #include "server/storage/database/schema.hpp"
@@ -90,8 +91,8 @@ SQLite::Database open_checked(const std::filesystem::path& path) {
     configure(database);
     return database;
   } catch (const SQLite::Exception& error) {
-    if (means_damage(error)) refuse(path, fmt::format("it is damaged ('{}'): {}", error.what(), kDamageRemedy));
-    refuse(path, fmt::format("SQLite says '{}' (code {})", error.what(), error.getExtendedErrorCode()));
+    if (means_damage(error)) refuse(path, fmt::format("{}: {}", runtime::text_of(error), kDamageRemedy));
+    refuse(path, runtime::text_of(error));
   }
 }
 

@@ -12,6 +12,7 @@
 #include <fstream>
 #include <string_view>
 
+#include "server/runtime/exceptions.hpp"
 #include "server/storage/database/schema.hpp"
 
 namespace server::storage {
@@ -161,8 +162,8 @@ bool means_damage(const std::exception& error) {
 }
 
 std::string write_problem(const std::exception& error) {
-  if (means_damage(error)) return fmt::format("it is damaged ('{}'): {}", error.what(), kDamageRemedy);
-  return fmt::format("{}. Make room on the disk, or end the program that holds the file", error.what());
+  if (means_damage(error)) return fmt::format("{}: {}", runtime::text_of(error), kDamageRemedy);
+  return fmt::format("{}. Make room on the disk, or end the program that holds the file", runtime::text_of(error));
 }
 
 std::string find_damage(SQLite::Database& database) {

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/version.hpp"
+#include "server/runtime/exceptions.hpp"
 #include "server/runtime/sha256.hpp"
 #include "server/storage/audit/audit_chain.hpp"
 #include "server/storage/database/database.hpp"
@@ -121,8 +122,8 @@ asio::awaitable<Result<Design>> Designs::store(DesignRequest request, station::A
     try {
       return insert_design(database.handle(), design, by);
     } catch (const SQLite::Exception& error) {
-      return fail(ErrorCode::unavailable, fmt::format("the design could not be stored: {}; try again", error.what()),
-                  "not_stored");
+      return fail(ErrorCode::unavailable,
+                  fmt::format("the design could not be stored: {}; try again", runtime::text_of(error)), "not_stored");
     }
   };
   const Result<void> stored = co_await recorder_.on_disk(std::move(job));

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "server/runtime/exceptions.hpp"
 #include "server/storage/database/statement.hpp"
 #include "server/storage/runs/run_queries.hpp"
 #include "server/storage/runs/run_store.hpp"
@@ -121,7 +122,8 @@ asio::awaitable<void> RunFinalizer::run() {
     try {
       co_await pass();
     } catch (const SQLite::Exception& error) {  // an unreadable page is no reason to end the emergency stop
-      spdlog::error("runs that are to become final cannot be found: {}; looked at again in 30 s", error.what());
+      spdlog::error("runs that are to become final cannot be found: {}; looked at again in 30 s",
+                    runtime::text_of(error));
     }
   }
 }

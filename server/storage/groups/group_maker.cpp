@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <vector>
 
+#include "server/runtime/exceptions.hpp"
 #include "server/storage/database/statement.hpp"
 #include "server/storage/groups/segment_groups.hpp"
 
@@ -85,7 +86,7 @@ asio::awaitable<void> GroupMaker::run() {
     try {
       co_await pass();
     } catch (const SQLite::Exception& error) {
-      spdlog::warn("groups of segments cannot be made now: {}; tried again in a minute", error.what());
+      spdlog::warn("groups of segments cannot be made now: {}; tried again in a minute", runtime::text_of(error));
     }
     co_await clock_.sleep_for(kLookInterval);
   }

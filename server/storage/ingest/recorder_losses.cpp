@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "server/runtime/counted.hpp"
+#include "server/runtime/exceptions.hpp"
 #include "server/storage/ingest/boot_segments.hpp"
 #include "server/storage/ingest/recorder.hpp"
 
@@ -86,7 +87,7 @@ asio::awaitable<bool> Recorder::load(BootEntry& boot, station::RobotId robot_id)
     try {
       return BootStore{database}.find(robot_id, boot_id);
     } catch (const SQLite::Exception& error) {
-      spdlog::error("boot {} of robot '{}' cannot be read: {}", boot_id, robot_id, error.what());
+      spdlog::error("boot {} of robot '{}' cannot be read: {}", boot_id, robot_id, runtime::text_of(error));
       return std::nullopt;
     }
   };

@@ -8,6 +8,7 @@
 #include <boost/asio/experimental/awaitable_operators.hpp>
 
 #include "server/runtime/counted.hpp"
+#include "server/runtime/exceptions.hpp"
 
 namespace server::storage {
 namespace asio = boost::asio;
@@ -44,7 +45,7 @@ asio::awaitable<Result<Job>> Jobs::begin(JobRequest request, JobWork work) {
       job.id = add_job(database.handle(), job.request, job.created_at_us);
       return {};
     } catch (const SQLite::Exception& error) {
-      return error.what();
+      return runtime::text_of(error);
     }
   };
   const runtime::Counted one_more{being_added_};
@@ -119,7 +120,7 @@ asio::awaitable<JobEnd> Jobs::end_of(const JobWork& work, JobRun& run) {
   } catch (const boost::system::system_error&) {
     throw;  // the station stops
   } catch (const std::exception& exception) {
-    error = exception.what();
+    error = runtime::text_of(exception);
   }
   if (run.is_cancelled()) co_return JobEnd{JobState::cancelled, {}, {}};
   co_return JobEnd{JobState::failed, {}, std::move(error)};
@@ -133,7 +134,7 @@ asio::awaitable<void> Jobs::store(std::function<void(SQLite::Database&)> change)
         change(database.handle());
         return {};
       } catch (const SQLite::Exception& error) {
-        return error.what();
+        return runtime::text_of(error);
       }
     };
     const std::string problem = co_await recorder_.on_disk(std::move(job));

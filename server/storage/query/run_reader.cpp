@@ -10,6 +10,7 @@
 #include <cerrno>
 #include <charconv>
 
+#include "server/runtime/exceptions.hpp"
 #include "server/storage/database/database.hpp"
 #include "server/storage/database/schema.hpp"
 #include "server/storage/database/statement.hpp"
@@ -149,7 +150,7 @@ Result<void> read_store(const std::filesystem::path& path, const ReadStore& read
     }
     return checked(open_for_reading(path), false);  // also when a station has begun meanwhile
   } catch (const SQLite::Exception& error) {
-    return fail(ErrorCode::unavailable, fmt::format("cannot read {}: SQLite says '{}'", path.string(), error.what()));
+    return fail(ErrorCode::unavailable, fmt::format("cannot read {}: {}", path.string(), runtime::text_of(error)));
   }
 }
 

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "server/runtime/exceptions.hpp"
 #include "server/storage/audit/audit_chain.hpp"
 #include "server/storage/database/database.hpp"
 #include "server/storage/database/statement.hpp"
@@ -115,7 +116,7 @@ asio::awaitable<Result<Reservation>> ReservationBook::change(Job job) {
       if (error.getExtendedErrorCode() == SQLITE_CONSTRAINT_TRIGGER) {
         return fail(ErrorCode::conflict, "another reservation of this robot was made meanwhile", "reserved");
       }
-      return fail(ErrorCode::unavailable, fmt::format("it could not be stored: {}; try again", error.what()),
+      return fail(ErrorCode::unavailable, fmt::format("it could not be stored: {}; try again", runtime::text_of(error)),
                   "not_stored");
     }
   };

@@ -7,6 +7,7 @@
 #include <optional>
 #include <vector>
 
+#include "server/runtime/exceptions.hpp"
 #include "server/storage/audit/audit_chain.hpp"
 #include "server/storage/database/database.hpp"
 #include "server/storage/database/statement.hpp"
@@ -79,8 +80,8 @@ Result<void> stored(Database& database, const std::string& fluid, const station:
     append(database.handle(), fluid, model, by);
     return {};
   } catch (const SQLite::Exception& error) {
-    return fail(ErrorCode::unavailable, fmt::format("the model could not be stored: {}; try again", error.what()),
-                "not_stored");
+    return fail(ErrorCode::unavailable,
+                fmt::format("the model could not be stored: {}; try again", runtime::text_of(error)), "not_stored");
   }
 }
 

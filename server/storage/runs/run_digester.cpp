@@ -8,6 +8,7 @@
 #include <tuple>
 #include <utility>
 
+#include "server/runtime/exceptions.hpp"
 #include "server/storage/database/statement.hpp"
 #include "server/storage/runs/run_queries.hpp"
 
@@ -37,7 +38,7 @@ Page next_page(SQLite::Database& database, RunId run, std::optional<DigestComput
     page.computation = begun ? std::move(*begun) : DigestComputation{read_digest_spans(database, run)};
     page.progress = page.computation.advance(database, kPageSamples);
   } catch (const std::exception& error) {  // the file is damaged or the disk fails: the station goes on without
-    page.problem = error.what();
+    page.problem = runtime::text_of(error);
   }
   return page;
 }
@@ -51,7 +52,7 @@ std::vector<RunId> runs_without_digest(SQLite::Database& database) {
                            " AND NOT EXISTS (SELECT 1 FROM run_certificate WHERE run_id = run.run_id)"};
     while (rows.executeStep()) runs.push_back(rows.getColumn(0).getInt64());
   } catch (const SQLite::Exception& error) {
-    spdlog::error("runs without a digest cannot be looked for: {}", error.what());
+    spdlog::error("runs without a digest cannot be looked for: {}", runtime::text_of(error));
   }
   return runs;
 }

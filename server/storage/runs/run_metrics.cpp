@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include "server/runtime/exceptions.hpp"
 #include "server/storage/database/statement.hpp"
 
 namespace server::storage {
@@ -37,7 +38,7 @@ asio::awaitable<Result<void>> MetricsOfRuns::store(StoredMetrics metrics) {
               metrics.computed_at_us, metrics.document);
       return {};
     } catch (const SQLite::Exception& error) {
-      return fail(ErrorCode::unavailable, fmt::format("the metrics could not be stored: {}", error.what()),
+      return fail(ErrorCode::unavailable, fmt::format("the metrics could not be stored: {}", runtime::text_of(error)),
                   "not_stored");
     }
   };

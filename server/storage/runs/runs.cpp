@@ -7,6 +7,7 @@
 
 #include <algorithm>
 
+#include "server/runtime/exceptions.hpp"
 #include "server/storage/database/database_reader.hpp"
 #include "server/storage/ingest/recorder.hpp"
 #include "server/storage/runs/run_digester.hpp"
@@ -57,7 +58,7 @@ auto or_problem(Job job) {
     try {
       return job(database);
     } catch (const SQLite::Exception& error) {
-      return fail(ErrorCode::unavailable, error.what());
+      return fail(ErrorCode::unavailable, runtime::text_of(error));
     }
   };
 }

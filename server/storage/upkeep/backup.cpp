@@ -9,6 +9,7 @@
 #include <cctype>
 #include <map>
 
+#include "server/runtime/exceptions.hpp"
 #include "server/storage/database/file_check.hpp"
 #include "server/storage/database/finished_file.hpp"
 
@@ -57,7 +58,7 @@ CopyStep make_step(std::unique_ptr<BackupCopy>& copy, const runtime::Clock& cloc
     step.pages_done = copy->pages_done();
     step.pages_total = copy->pages_total();
   } catch (const std::exception& error) {
-    step.problem = fmt::format("the copy cannot be written: {}", error.what());
+    step.problem = fmt::format("the copy cannot be written: {}", runtime::text_of(error));
   }
   if (!step.problem.empty()) copy.reset();
   if (step.complete) copy->finish();
@@ -145,7 +146,7 @@ asio::awaitable<Result<BackupRecord>> Backups::begin(std::string name) {
     try {
       return check_room(path, database, store_id);
     } catch (const std::exception& error) {
-      spdlog::error("backups: {}", error.what());
+      spdlog::error("backups: {}", runtime::text_of(error));
       return fail(ErrorCode::unavailable, "the folder of backups cannot be used; the station's log says why");
     }
   };
@@ -212,7 +213,7 @@ asio::awaitable<std::string> Backups::copy(BackupRecord& record) {
       copy_ = std::make_unique<BackupCopy>(database.handle(), path);
       return {};
     } catch (const std::exception& error) {
-      return fmt::format("'{}' cannot be made: {}", path.string(), error.what());
+      return fmt::format("'{}' cannot be made: {}", path.string(), runtime::text_of(error));
     }
   };
   const std::string problem = co_await recorder_.on_disk(std::move(open));
@@ -247,7 +248,7 @@ asio::awaitable<std::string> Backups::verify(const BackupRecord& record) {
       copy->exec("PRAGMA journal_mode = DELETE");
       return {};
     } catch (const std::exception& error) {
-      return fmt::format("the copy cannot be read: {}", error.what());
+      return fmt::format("the copy cannot be read: {}", runtime::text_of(error));
     }
   };
   std::string problem = co_await checker_.run(std::move(open));
@@ -256,7 +257,7 @@ asio::awaitable<std::string> Backups::verify(const BackupRecord& record) {
     try {
       return find_damage(*copy);
     } catch (const std::exception& error) {
-      return error.what();
+      return runtime::text_of(error);
     }
   };
   auto checked = co_await (checker_.run(std::move(check)) || interrupt_when_cancelled(*copy));
@@ -269,7 +270,7 @@ asio::awaitable<std::string> Backups::verify(const BackupRecord& record) {
       finish_file(part, path);
       return {};
     } catch (const std::exception& error) {
-      return error.what();
+      return runtime::text_of(error);
     }
   };
   co_return co_await checker_.run(std::move(finish));

@@ -7,6 +7,7 @@
 
 #include <system_error>
 
+#include "server/runtime/exceptions.hpp"
 #include "server/storage/database/disk_reserve.hpp"
 
 namespace server::storage {
@@ -69,7 +70,7 @@ asio::awaitable<void> DiskWatch::look() {
       use.free_bytes = free_bytes(fs::absolute(path).parent_path());
       keep_disk_reserve(path, use.free_bytes);
     } catch (const std::system_error& error) {
-      spdlog::warn("the room on the disk cannot be told: {}", error.what());
+      spdlog::warn("the room on the disk cannot be told: {}", runtime::text_of(error));
     }
     return use;
   };

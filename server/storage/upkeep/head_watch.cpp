@@ -9,6 +9,7 @@
 #include <optional>
 #include <utility>
 
+#include "server/runtime/exceptions.hpp"
 #include "server/storage/database/database.hpp"
 #include "server/storage/query/run_reader.hpp"
 
@@ -23,7 +24,7 @@ std::string try_to_save(const std::filesystem::path& database, const HeadFile& f
     save_head_file(database, file);
     return {};
   } catch (const std::exception& error) {
-    return error.what();
+    return runtime::text_of(error);
   }
 }
 
@@ -42,7 +43,7 @@ Look write_if_changed(const std::filesystem::path& path, HeadFile file) {
     save_head_file(path, file);
     return {now, ""};
   } catch (const std::exception& error) {
-    return {std::nullopt, error.what()};
+    return {std::nullopt, runtime::text_of(error)};
   }
 }
 
@@ -69,10 +70,10 @@ HeadWatch::Opened HeadWatch::compare(Database& database, const std::filesystem::
     opened.file.head = read_store_head(database.handle());
     opened.file.at_us = utc_us;
   } catch (const SQLite::Exception& error) {
-    opened.problem = error.what();
+    opened.problem = runtime::text_of(error);
     if (error.getErrorCode() != SQLITE_CORRUPT) return opened;
     opened.loss = fmt::format("whether commits are lost since {} of them cannot be told: {}", opened.file.head.commits,
-                              error.what());
+                              runtime::text_of(error));
   }
   if (before && !*before && opened.file.head.commits > 0) {
     spdlog::warn("{} is not there: whether {} has lost commits cannot be told", head_file_of(path).string(),
@@ -126,7 +127,7 @@ void HeadWatch::close() {
     file.at_us = clock_.utc_us();
     if (file.head.commits >= file_.head.commits && file.head != file_.head) save_head_file(path_, file);
   } catch (const std::exception& error) {
-    note_problem(error.what());
+    note_problem(runtime::text_of(error));
   }
 }
 

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
+#include "server/runtime/exceptions.hpp"
 #include "server/storage/audit/audit_chain.hpp"
 #include "server/storage/database/backup_copy.hpp"
 #include "server/storage/database/database.hpp"
@@ -81,7 +82,7 @@ RestoredStore restore_database(const fs::path& from, const fs::path& folder, con
     const std::string damage = find_damage(written);
     if (!damage.empty()) refuse(from, "it is damaged: " + damage);
   } catch (const SQLite::Exception& error) {
-    refuse(from, fmt::format("SQLite says '{}'", error.what()));
+    refuse(from, runtime::text_of(error));
   }
   {
     Database database{draft.path(), BeforeMigration::change_in_place};  // the backup is the copy

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <string>
 
+#include "server/runtime/exceptions.hpp"
 #include "server/storage/upkeep/event_purge.hpp"
 #include "server/storage/upkeep/purge.hpp"
 
@@ -39,7 +40,7 @@ Step measured(const runtime::Clock& clock, Work work) {
   try {
     step.done = work();
   } catch (const std::exception& error) {
-    step.problem = error.what();
+    step.problem = runtime::text_of(error);
   }
   step.took_us = clock.steady_us() - begun_us;
   return step;
@@ -73,7 +74,7 @@ asio::awaitable<void> Retention::run() {
     try {
       co_await pass();
     } catch (const SQLite::Exception& error) {  // an unreadable page is no reason to end the emergency stop
-      spdlog::error("what is to be removed cannot be found: {}; looked at again in 30 s", error.what());
+      spdlog::error("what is to be removed cannot be found: {}; looked at again in 30 s", runtime::text_of(error));
     }
   }
 }

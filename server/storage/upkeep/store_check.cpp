@@ -7,6 +7,7 @@
 #include <limits>
 #include <map>
 
+#include "server/runtime/exceptions.hpp"
 #include "server/storage/database/statement.hpp"
 #include "server/storage/groups/segment_groups.hpp"
 #include "server/storage/runs/run_digest.hpp"
@@ -289,7 +290,7 @@ void Checking::check_digest(RunId run) {
     try {
       progress = computation->advance(database_, kPageSamples);
     } catch (const std::runtime_error& error) {  // a row is not there, or cannot be read
-      return fault("run {}: {}", run, error.what());
+      return fault("run {}: {}", run, runtime::text_of(error));
     }
   }
   const bool is_complete = progress == DigestComputation::Progress::done;
@@ -350,7 +351,7 @@ Result<StoreFindings> check_store(SQLite::Database& database, const StoreCheck& 
     check_all(database, options, findings);
   } catch (const SQLite::Exception& error) {  // what cannot be read is damaged; anything else is not the database's
     if (error.getErrorCode() != SQLITE_CORRUPT && error.getErrorCode() != SQLITE_NOTADB) throw;
-    findings.faults.push_back(fmt::format("SQLite: {}", error.what()));
+    findings.faults.push_back(fmt::format("SQLite: {}", runtime::text_of(error)));
   }
   return findings;
 }

@@ -9,6 +9,7 @@
 #include <iterator>
 #include <nlohmann/json.hpp>
 
+#include "server/runtime/exceptions.hpp"
 #include "server/runtime/private_file.hpp"
 #include "server/runtime/secrets.hpp"
 #include "server/storage/database/statement.hpp"
@@ -88,7 +89,7 @@ Result<std::optional<HeadFile>> load_head_file(const fs::path& database) {
   } catch (const json::exception&) {  // its words quote the file, whatever that holds
     return unusable(path, database, "it is not as the station writes it");
   } catch (const std::exception& error) {
-    return unusable(path, database, error.what());
+    return unusable(path, database, runtime::text_of(error));
   }
 }
 

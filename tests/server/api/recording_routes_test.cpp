@@ -101,7 +101,7 @@ TEST_F(RecordingRoutesTest, ALockedDatabaseIsFailingUntilItIsFree) {
   clock.run_for(2s);
   const json health = ask("GET", "/api/v1/recording").parsed();
   EXPECT_EQ(health["state"], "failing");
-  EXPECT_THAT(health["problem"].get<std::string>(), HasSubstr("database is locked"));
+  EXPECT_THAT(health["problem"].get<std::string>(), HasSubstr("another program holds the file"));
   EXPECT_EQ(health["queued_samples"], 20);
   EXPECT_THAT(ask("GET", "/metrics").body, HasSubstr("\nrheonaut_recording_failing 1\n"));
   foreign.exec("ROLLBACK");

@@ -161,7 +161,7 @@ TEST_F(LoopTools, TuneSaysWhyThePapersSpecificationHasNoSolution) {
   EXPECT_FALSE(json.contains("kp"));
   const Answer table = ask("tune --crossover-rad-s 65 --phase-margin-deg 72");
   EXPECT_EQ(table.exit_code, 3);
-  EXPECT_THAT(table.text, HasSubstr("not feasible"));
+  EXPECT_THAT(table.error, HasSubstr("not feasible"));
   EXPECT_THAT(table.text, HasSubstr("nearest"));
 }
 
@@ -205,7 +205,7 @@ TEST_F(LoopTools, BodeAndTuneSayWhatTheHoldOfTheDutyCosts) {
   EXPECT_EQ(tuned["asked"]["period_s"], 0.01);
   const Answer refused = ask("tune --crossover-rad-s 60 --phase-margin-deg 15");
   EXPECT_EQ(refused.exit_code, 3);
-  EXPECT_THAT(refused.text, HasSubstr("unstable as the robot runs it"));
+  EXPECT_THAT(refused.error, HasSubstr("unstable as the robot runs it"));
   EXPECT_EQ(ask("tune --crossover-rad-s 60 --phase-margin-deg 15 --period-s 0").exit_code, 0);
   const auto unsampled = ask("tune --map --from-rad-s 58 --to-rad-s 70 --points 2 --period-s 0 --json").json();
   const auto sampled = ask("tune --map --from-rad-s 58 --to-rad-s 70 --points 2 --json").json();
@@ -270,7 +270,7 @@ TEST_F(LoopTools, EstimatorRefusesAPlantThatSwings) {
   EXPECT_FALSE(answer.json().contains("model_gain_m_s"));
   const Answer table = ask("estimator --plant @swing.json");
   EXPECT_EQ(table.exit_code, 3);
-  EXPECT_THAT(table.text, HasSubstr("the robot cannot use a model of this plant: four first-order sections"));
+  EXPECT_THAT(table.error, HasSubstr("the robot cannot use a model of this plant: four first-order sections"));
 }
 
 TEST_F(LoopTools, ModelShowsThePresetsAndTheDerivedNumerator) {

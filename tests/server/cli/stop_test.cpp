@@ -133,7 +133,7 @@ TEST_F(StopTool, AStationWithoutRobotsHasStoppedNothing) {
   const SlowStation station{folder_ / "data", {none}};
   const Answer answer = ask("stop --data @data");
   EXPECT_EQ(answer.exit_code, 5);
-  EXPECT_THAT(answer.text, ::testing::HasSubstr("this station knows no robot"));
+  EXPECT_THAT(answer.error, ::testing::HasSubstr("this station knows no robot"));
 }
 
 // SAFETY: more robots than an answer names are not forgotten.

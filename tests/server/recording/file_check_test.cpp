@@ -211,7 +211,7 @@ TEST_F(FileCheckTest, DamageAtRunTimeSaysWhatToDoAndDoesNotAskForRoom) {
   make(robot, 200);
   clock_.run_for(3s);
   EXPECT_TRUE(recorder_->failing());
-  EXPECT_THAT(recorder_->problem(), HasSubstr("it is damaged"));
+  EXPECT_THAT(recorder_->problem(), HasSubstr("the file is damaged"));
   EXPECT_THAT(recorder_->problem(), HasSubstr("stop the station, run rheonaut verify, restore a backup"));
   EXPECT_THAT(recorder_->problem(), ::testing::Not(HasSubstr("Make room")));
   EXPECT_EQ(durable_next_seq_, 0U);
