@@ -6,17 +6,30 @@
 
 #include <algorithm>
 #include <cstring>
+#include <string_view>
 
 #include "server/station/state/checked.hpp"
 
 namespace server::link {
 namespace {
 
+// What is too long ends after a whole word, or at least after a whole character.
+std::string within(const std::string& text, std::size_t most_bytes) {
+  if (text.size() <= most_bytes) return text;
+  constexpr std::string_view kGoesOn = " ...";
+  std::size_t end = most_bytes - kGoesOn.size();
+  if (const std::size_t space = text.rfind(' ', end); space != std::string::npos) {
+    end = space;
+  } else {
+    while (end > 0 && (static_cast<unsigned char>(text[end]) & 0xC0U) == 0x80U) --end;
+  }
+  return text.substr(0, end).append(kGoesOn);
+}
+
 template <std::size_t size>
 void copy_text(char (&to)[size], const std::string& from) {
-  const std::size_t count = std::min(from.size(), size - 1);
-  std::memcpy(to, from.data(), count);
-  to[count] = '\0';
+  const std::string text = within(from, size - 1);
+  std::memcpy(to, text.c_str(), text.size() + 1);
 }
 
 bool is_robot_id(const std::string& id) {

@@ -141,5 +141,26 @@ TEST(Greeting, ARefusalOfTheArchiveIsCutToItsRoom) {
   EXPECT_EQ(std::strlen(welcome.detail), sizeof welcome.detail - 1);
 }
 
+TEST(Greeting, WhatARobotIsToldEndsAfterAWholeWord) {
+  const auto told = [](const std::string& detail) {
+    return std::string{welcome_of(link::Refusal{rheonaut_REFUSAL_REASON_WRONG_TOKEN, detail}).detail};
+  };
+  const std::string fits(sizeof rheonaut_Welcome::detail - 1, 'x');
+  EXPECT_EQ(told(fits), fits);
+  const std::string boot = "17680386226788228036";
+  for (std::size_t before = 90; before < 127; ++before) {
+    const std::string begins = std::string(before - 6, 'x') + " boot";
+    const std::string said = told(begins + " " + boot + " of another robot, which goes on for much longer than it may");
+    EXPECT_TRUE(said.ends_with(" ...")) << said;
+    EXPECT_TRUE(said.find(boot) != std::string::npos || said.find('1') == std::string::npos) << said;
+  }
+  std::string micro;
+  for (int i = 0; i < 100; ++i) micro += "µ";  // two bytes each
+  for (const std::string& text : {micro, "x" + micro}) {
+    const std::string said = told(text);
+    EXPECT_TRUE(said.ends_with("µ ...")) << said;
+  }
+}
+
 }  // namespace
 }  // namespace server
