@@ -261,6 +261,32 @@ TEST_F(ExportTest, AMatFileSaysWhatIsKnownOfTheRun) {
   EXPECT_NE(field("modes").find(fmt::format("{} auto", static_cast<int>(rheonaut_MODE_AUTO))), std::string::npos);
 }
 
+TEST_F(ExportTest, AMatFileCanBeReadWhateverTheNameOfTheRun) {
+  const storage::RunId run = record(2);
+  std::string longest;
+  for (int i = 0; i < 64; ++i) longest += "🐟";
+  for (const auto& [name, read] : {std::pair<std::string, std::u16string>{"µ שלום 語", u"µ שלום 語"},
+                                   {"a 🐟 b", u"a \\u{1F41F} b"},
+                                   {longest, u""}}) {
+    SQLite::Database foreign{path_.string(), SQLite::OPEN_READWRITE};
+    SQLite::Statement rename{foreign, "UPDATE run SET name = ?"};
+    rename.bind(1, name);
+    rename.exec();
+    const auto file = mat({.run = run, .channels = storage::all_channels(), .grid_us = {}});
+    const std::unique_ptr<mat_t, int (*)(mat_t*)> opened{Mat_Open(file.c_str(), MAT_ACC_RDONLY), Mat_Close};
+    const std::unique_ptr<matvar_t, void (*)(matvar_t*)> facts{Mat_VarRead(opened.get(), "info"), Mat_VarFree};
+    ASSERT_NE(facts, nullptr);
+    const matvar_t* found = Mat_VarGetStructFieldByName(facts.get(), "name", 0);
+    ASSERT_TRUE(found != nullptr && found->data != nullptr);
+    const std::u16string wide{static_cast<const char16_t*>(found->data), found->nbytes / 2};
+    EXPECT_EQ(wide.size(), found->dims[1]);
+    EXPECT_TRUE(std::ranges::none_of(wide, [](char16_t unit) { return unit >= 0xD800 && unit < 0xE000; })) << name;
+    if (!read.empty()) {
+      EXPECT_TRUE(wide == read) << name;
+    }
+  }
+}
+
 // A gap of an hour on a grid of 0.1 ms is 36 million rows: they come in pieces.
 TEST_F(ExportTest, ALongGapOnAFineGridComesInPieces) {
   start();

@@ -47,9 +47,18 @@ void put_context(const station::SampleContext& context, const Put& put) {
   });
 }
 
-// A character is two bytes there, whatever its place in the alphabets.
+// A character is two bytes there. One beyond U+FFFF would be two characters, which readers count as one: to them the
+// whole file is broken. So its number is written: \u{1F41F}.
 matvar_t* text_variable(const std::string& text) {
-  std::u16string wide = boost::locale::conv::utf_to_utf<char16_t>(text);
+  std::u16string wide;
+  for (const char32_t character : boost::locale::conv::utf_to_utf<char32_t>(text)) {
+    if (character <= 0xFFFF) {
+      wide += static_cast<char16_t>(character);
+    } else {
+      const std::string number = fmt::format("\\u{{{:X}}}", static_cast<std::uint32_t>(character));
+      wide.append(number.begin(), number.end());
+    }
+  }
   std::size_t dimensions[2] = {wide.empty() ? 0U : 1U, wide.size()};
   return Mat_VarCreate(nullptr, MAT_C_CHAR, MAT_T_UTF16, 2, dimensions, wide.data(), 0);
 }
