@@ -132,11 +132,15 @@ export const in_auto = (bench, robot_id, setpoint_m) =>
     return false;
   });
 
-// The same as a script does it. The page may have sent a stop a second time: the latest latch is cleared.
+// The same as a script does it. The page may send a stop a second time, which may come after the first clear: the robot stays
+// in manual for a second of samples, by which the page knows that it was stopped.
 export const clear_by_script = (bench, robot_id) =>
   until('the latch is cleared', async () => {
     const { mode, emergency_id } = await bench.ask(`/robots/${robot_id}`);
-    if (mode === 'manual') return true;
+    if (mode === 'manual') {
+      await samples(bench, robot_id, 100);
+      return (await bench.ask(`/robots/${robot_id}`)).mode === 'manual';
+    }
     if (emergency_id !== null) await bench.post(`/robots/${robot_id}/commands`, { kind: 'clear_emergency', emergency_id });
     return false;
   });
