@@ -1,4 +1,4 @@
-// What went wrong, in words for a person.
+// The table of causes, by the type of the exception and its code.
 #include "base/failures/words.hpp"
 
 #include <array>

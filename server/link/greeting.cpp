@@ -13,7 +13,7 @@
 namespace server::link {
 namespace {
 
-// What is too long ends after a whole word, or at least after a whole character.
+// A text that is too long ends after a whole word, or at least after a whole character.
 std::string within(const std::string& text, std::size_t most_bytes) {
   if (text.size() <= most_bytes) return text;
   constexpr std::string_view kGoesOn = " ...";

@@ -1,4 +1,4 @@
-// What a person reads of an exception: Rheonaut's own words, and for a library's the cause without its text.
+// Words of an exception for a person: Rheonaut's own as they are, and of a library's the cause without its text.
 #include "base/failures/words.hpp"
 
 #include <gmock/gmock.h>
