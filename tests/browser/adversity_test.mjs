@@ -193,7 +193,7 @@ const steps = {
     const page = ben;
     const ways = {
       'let go outside the button': [by_mouse, async () => (await page.mouse.move(5, 5), await page.mouse.up())],
-      'the pointer is taken away': [by_mouse, () => page.evaluate(() => document.querySelector('#hold-to-run').dispatchEvent(new PointerEvent('pointercancel', { bubbles: true })))],
+      'the pointer is taken away': [by_mouse, () => page.locator('#hold-to-run').evaluate((button) => button.dispatchEvent(new PointerEvent('pointercancel', { bubbles: true })))],
       'another window has the focus': [by_mouse, () => page.evaluate(() => dispatchEvent(new Event('blur')))],
       'the page is hidden': [by_mouse, () => page.evaluate(() => {
         Object.defineProperty(document, 'hidden', { configurable: true, get: () => true });
@@ -202,7 +202,7 @@ const steps = {
       })],
       'the key never comes up, the focus goes': [by_key, () => page.focus('#run-name')],
       'the key is down still when the focus comes back': [by_key, async () => (await page.focus('#run-name'), await page.focus('#hold-to-run'), await page.keyboard.down(' '))],
-      'the key never comes up, another view opens': [by_key, () => page.evaluate(() => document.querySelector('#open-fleet').click())],
+      'the key never comes up, another view opens': [by_key, () => page.locator('#open-fleet').evaluate((link) => link.click())],
       'the robot is stopped by somebody else': [by_mouse, () => bench.post(`/robots/${kRobot}/emergency-stop`)],
     };
     for (const [what, [begin, end]] of Object.entries(ways)) {

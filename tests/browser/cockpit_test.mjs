@@ -49,8 +49,7 @@ async function latched() {
 
 // Lets go of the button too early, which clears nothing, and then clears the latch.
 async function clear_latch() {
-  await page.evaluate(() => {
-    const button = document.querySelector('#clear-emergency');
+  await page.locator('#clear-emergency').evaluate((button) => {
     button.addEventListener('pointerdown', () => (window.pressed_at_ms = performance.now()));
     addEventListener('pointerup', () => (window.held_ms = performance.now() - window.pressed_at_ms), { once: true });
   });
@@ -93,12 +92,11 @@ const steps = {
     await engage_auto(page, 100);
     await until('the position arrives', async () => Math.abs((await number('position')) - 100) < 2);
     await until('the setpoint is shown', async () => (await number('setpoint')) === 100);
-    const drawn = await page.evaluate(() => {
-      const canvas = document.querySelector('.strip-0 canvas');
+    const colours = () => page.locator('.strip-0 canvas').first().evaluate((canvas) => {
       const pixels = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height).data;
       return new Set(Uint32Array.from(new Uint32Array(pixels.buffer))).size;
     });
-    assert.ok(drawn > 10, 'the plot has traces');
+    await until('the plot has traces', async () => (await colours()) > 10);
   },
 
   async 'Escape stops, also from inside a field; the time is shown'() {

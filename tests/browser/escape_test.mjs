@@ -28,9 +28,9 @@ const steps = {
     bench.start_robot(kRobot);
     await page.locator('.annunciator h1').getByText(kRobot).waitFor();
     await live(page);
-    const kept_shut = await page.evaluate(() => new Promise((done) => {
+    const kept_shut = await page.locator('#run-name').evaluate((field) => new Promise((done) => {
       addEventListener('contextmenu', (event) => done(event.defaultPrevented), { once: true });
-      document.querySelector('#run-name').dispatchEvent(new MouseEvent('contextmenu', { bubbles: true, cancelable: true }));
+      field.dispatchEvent(new MouseEvent('contextmenu', { bubbles: true, cancelable: true }));
     }));
     assert.ok(kept_shut);
   },
@@ -77,8 +77,9 @@ const steps = {
     assert.match(text, /full screen/);
     for (const [width, height] of [[1024, 768], [844, 390], [1440, 900]]) {
       await page.setViewportSize({ width, height });
-      const over = await page.evaluate(() => {
-        const [panel, stop, all] = ['#key-list', '#emergency-stop', '#stop-all'].map((each) => document.querySelector(each).getBoundingClientRect());
+      await page.locator('#stop-all').waitFor();
+      const over = await list.evaluate((key_list) => {
+        const [panel, stop, all] = [key_list, ...['#emergency-stop', '#stop-all'].map((each) => document.querySelector(each))].map((each) => each.getBoundingClientRect());
         return [stop, all].some((each) => panel.right > each.left && panel.bottom > each.top && panel.left < each.right && panel.top < each.bottom);
       });
       assert.ok(!over, `it never lies over a button that stops, at ${width} × ${height}`);
@@ -98,7 +99,7 @@ const steps = {
       await page.focus(`#added ${where}`);
       await escape_stops(where);
     }
-    await page.evaluate(() => document.querySelector('#added dialog').showModal());
+    await page.locator('#added dialog').evaluate((dialog) => dialog.showModal());
     await page.focus('#added dialog input');
     await escape_stops('a modal dialog');
     await page.reload();

@@ -167,20 +167,18 @@ export const running_time = (page, from_ms, to_ms) =>
 // From now on each value that an attribute of it has, in the order in which it had them: one that a busy machine shows for
 // a moment only is not missed.
 export async function watch_attribute(page, selector, name) {
-  const values = await page.evaluateHandle(([selector, name]) => {
-    const element = document.querySelector(selector);
+  const values = await page.locator(selector).first().evaluateHandle((element, name) => {
     const values = [element.getAttribute(name)];
     new MutationObserver(() => values.push(element.getAttribute(name))).observe(element, { attributes: true, attributeFilter: [name] });
     return values;
-  }, [selector, name]);
+  }, name);
   return () => values.jsonValue();
 }
 
 // How much of the estimate's trace, the brightest colour of the dark page, is in a share of the first strip.
 export const trace_pixels = (page, from, to) =>
-  page.evaluate(
-    ([from, to]) => {
-      const canvas = document.querySelector('.strip-0 canvas');
+  page.locator('.strip-0 canvas').first().evaluate(
+    (canvas, [from, to]) => {
       const ratio = devicePixelRatio;
       const [left, width] = [58 * ratio, canvas.width - 76 * ratio];
       const x = Math.round(left + from * width);

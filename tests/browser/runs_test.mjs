@@ -49,11 +49,10 @@ const open = (address) => go_to(page, address);
 
 // How many colours a plot has: a plot without a trace has few.
 const colours = (selector) =>
-  page.evaluate((sought) => {
-    const canvas = document.querySelector(`${sought} canvas`);
+  page.locator(`${selector} canvas`).first().evaluate((canvas) => {
     const pixels = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height).data;
     return new Set(Uint32Array.from(new Uint32Array(pixels.buffer))).size;
-  }, selector);
+  });
 
 async function drag(selector, from_share, to_share) {
   const box = await page.locator(`${selector} .u-over`).boundingBox();

@@ -47,13 +47,12 @@ async function value_at(share, strip = '.strip-0') {
 
 // How many pixels of a canvas are not of its ground.
 const drawn = (selector) =>
-  page.evaluate((sought) => {
-    const canvas = document.querySelector(sought);
+  page.locator(selector).first().evaluate((canvas) => {
     const { data } = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height);
     let bright = 0;
     for (let at = 0; at < data.length; at += 4) if (data[at] > 150 && data[at + 3] > 120) bright += 1;
     return bright;
-  }, selector);
+  });
 
 const steps = {
   async 'without an experiment nothing is predicted'() {

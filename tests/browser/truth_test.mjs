@@ -34,7 +34,8 @@ const steps = {
       return Math.abs((await number('position')) - 100) < 2;
     });
     await shows(page, '#disturbance', 'disturbance 0.0 mm');
-    const both = await page.evaluate(() => ['seen', 'position'].map((name) => document.querySelector(`#numeral-${name} output`).textContent));
+    await page.locator('#numeral-seen output').waitFor();
+    const both = await page.locator('#numeral-position output').evaluate((position) => [document.querySelector('#numeral-seen output').textContent, position.textContent]);
     assert.equal(both[0], both[1], 'without a disturbance it sees where it is');
     await commanded(bench, kRobot, { kind: 'inject_disturbance', disturbance_m: -0.05 });
     await until('the robot stays at 150 mm', async () => {
