@@ -72,7 +72,7 @@ class DemoTest(unittest.TestCase):
             self.assertIn(b"<title>", answer.read())
         # A machine that stood still has the experiment aborted, as it must be; then there is no table.
         wait_until(lambda: "The station and the robot stay up" in demo.said(), WAIT_S, "the end of the experiment")
-        if "experiment is aborted" not in demo.said():
+        if ") is aborted" not in demo.said():
             self.assertRegex(demo.said(), r"setpoint 100\.0 mm   seen by the controller +(9\d|10\d)\.\d mm   estimated position +(9\d|10\d)\.\d ± \d+\.\d mm")
             self.assertRegex(demo.said(), r"samples: [34]\d{3} recorded, 0 lost")
         wait_until(lambda: Station(demo.data).robot("sim-1")["link"] == "connected", 60, "the robot is there")
@@ -97,6 +97,14 @@ class DemoTest(unittest.TestCase):
             self.assertEqual(stored, document["samples_stored"])
             self.assertEqual(0, document["samples_lost"])
         self.assertEqual([], running_in(demo.data))
+
+    def test_an_experiment_that_is_aborted_is_said_on_standard_error(self):
+        process = self.start("--once")
+        wait_until(lambda: "setpoint 100.0 mm" in self.said() or process.poll() is not None, 100, "the robot on its way")
+        subprocess.run([str(BIN / "rheonaut"), "stop", "--data", str(self.data)], capture_output=True, timeout=60)
+        self.assertEqual(5, process.wait(timeout=WAIT_S), self.said())
+        self.assertRegex(self.demo.errors.read_text(), r"^rheonaut: experiment 1 \(Figure 7.*\) is aborted: ")
+        self.assertNotIn("aborted", self.demo.output.read_text())
 
     def test_json_is_for_a_demo_that_ends(self):
         folder = self.enterContext(tempfile.TemporaryDirectory(prefix="rheonaut-"))

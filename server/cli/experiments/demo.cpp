@@ -193,12 +193,7 @@ Performed perform(const StationClient& client, const Narrator& narrator, Patienc
   Performed performed{station.finished_experiment(begun.at("experiment_id").get<std::int64_t>())};
   progress.end();
   const json& ended = performed.experiment;
-  if (!performed.is_done()) {
-    const json& detail = ended.at("detail");
-    narrator.say(fmt::format("The experiment is {}: {}", ended.at("state").get<std::string>(),
-                             detail.is_null() ? "no reason" : detail.get<std::string>()));
-    return performed;
-  }
+  if (!performed.is_done()) return performed;
   const std::string run = fmt::format("/api/v1/runs/{}", ended.at("runs").front().at("run_id").get<std::int64_t>());
   performed.steps = station.get(run + "/step-metrics").at("steps");
   performed.run = station.get(run);
@@ -276,7 +271,7 @@ int run(const Demo& options, std::ostream& out) {
     narrator.say(
         "Experiment of Figure 7: to 0.1 m, after 20 s the measured position is shifted by -0.05 m, 40 s in all.");
     const Performed performed = perform(*client, narrator, patience);
-    if (!performed.is_done()) status = kExperimentNotDone;
+    if (!performed.is_done()) status = not_done(kExperimentNotDone, outcome_of(performed.experiment));
     narrator.say(fmt::format("\nEverything is recorded in {}", database.string()));
     if (options.is_json) write_json(out, document(performed, database));
     if (!options.is_once) {

@@ -23,7 +23,7 @@ void add_options(CLI::App& command, Demo& options);
 
 // Starts both programs, prints a link to the page, performs the experiment and prints what was measured; then it waits
 // for SIGINT or SIGTERM, unless is_once, and ends both. What happens is printed at once, with is_json on standard error
-// and one document on `out` at the end. 0, or kExperimentNotDone.
+// and one document on `out` at the end. 0, or kExperimentNotDone, whose reason is on standard error.
 // Throws std::runtime_error saying what did not start.
 int run(const Demo& options, std::ostream& out);
 

@@ -181,13 +181,8 @@ void write_knowledge(std::ostream& out, const json& experiment) {
 }
 
 int write_one(const ExperimentCommand& options, const json& experiment, std::ostream& out) {
-  const auto state = experiment.at("state").get<std::string>();
-  const bool is_done = !is_over(experiment) || state == "done";
-  const std::string why =
-      text_of(is_over(experiment) || state == "paused" ? experiment.at("detail") : experiment.at("waits_for_detail"));
-  const std::string outcome =
-      fmt::format("experiment {} ({}) is {}{}", experiment.at("experiment_id").get<std::int64_t>(),
-                  experiment.at("name").get<std::string>(), state, why.empty() ? "" : ": " + why);
+  const bool is_done = !is_over(experiment) || experiment.at("state") == "done";
+  const std::string outcome = outcome_of(experiment);
   if (options.json) {
     fmt::print(out, "{}\n", experiment.dump(2));
   } else {
@@ -249,6 +244,14 @@ int show(const ExperimentCommand& options, std::ostream& out) {
 constexpr const char* kWaits = "Wait for its end, and be the sign of life that it needs; Ctrl-C aborts it";
 
 }  // namespace
+
+std::string outcome_of(const json& experiment) {
+  const auto state = experiment.at("state").get<std::string>();
+  const std::string why =
+      text_of(is_over(experiment) || state == "paused" ? experiment.at("detail") : experiment.at("waits_for_detail"));
+  return fmt::format("experiment {} ({}) is {}{}", experiment.at("experiment_id").get<std::int64_t>(),
+                     experiment.at("name").get<std::string>(), state, why.empty() ? "" : ": " + why);
+}
 
 void add_options(CLI::App& command, ExperimentCommand& options) {
   using Act = ExperimentCommand::Act;

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <iosfwd>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 
 namespace CLI {
@@ -26,6 +27,9 @@ struct ExperimentCommand {
 };
 
 void add_options(CLI::App& command, ExperimentCommand& options);
+
+// "experiment 3 (Figure 7) is aborted: the robot is in emergency", of an experiment as the API has it.
+std::string outcome_of(const nlohmann::json& experiment);
 
 // 0, or kExperimentNotDone of an experiment that was waited for and has not come to its end. While it waits, it is the
 // sign of life of the one in whose name the experiment runs; SIGINT aborts the experiment. Throws std::runtime_error
