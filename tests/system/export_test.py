@@ -106,6 +106,32 @@ class ExportTest(unittest.TestCase):
             self.assertEqual(station.get(f"/api/v1/runs/{run}")["samples_lost"], 0)
             self.assertEqual(list((place.data / ".exports").iterdir()), [], "nothing is left of what failed")
 
+    def test_every_format_takes_a_name_of_every_script(self):
+        names = ("\U0001f41f fish", "\u05e9\u05dc\u05d5\u05dd \U0001f41f", "\U0001f41f" * 50, "\u202eevil", "a\"b<c>'d'/..\\e")
+        with lab() as place:
+            station = place.start_station()
+            place.start_robot(station)
+            station.wait_for_robot("sim-1")
+            for name in names:
+                run = station.post("/api/v1/runs", {"robot_id": "sim-1", "name": name, "notes": "\U0001f41f" * 64})["run_id"]
+                wait_until(lambda run=run: station.get(f"/api/v1/runs/{run}")["samples_stored"] > 20, 60, "samples")
+                station.post(f"/api/v1/runs/{run}/end", {})
+                files = {ending: place.folder / f"{run}.{ending}" for ending in ("csv", "mat", "sqlite", "mcap", "html", "eln")}
+                for ending, to in files.items():
+                    what = {"html": ["report", run], "eln": ["capsule", run]}.get(ending, ["export", "--run", run, "--format", ending])
+                    done = place.tool(*what, "--to", to, "--data", place.data)
+                    self.assertEqual((done.returncode, to.exists()), (0, True), f"{ending} of {name!r}: {done.stderr}")
+                self.assertTrue(files["mat"].read_bytes().startswith(b"MATLAB 5.0"))
+                with contextlib.closing(sqlite3.connect(files["sqlite"])) as database:
+                    self.assertEqual(database.execute("SELECT name, notes FROM run").fetchone(), (name, "\U0001f41f" * 64))
+                self.assertEqual(read_mcap(files["mcap"])["metadata"]["rheonaut.run"]["name"], name)
+                reproduced = place.tool("reproduce", files["eln"])
+                self.assertEqual(reproduced.returncode, 0, reproduced.stdout + reproduced.stderr)
+                status, headers, _ = station.request("GET", f"/api/v1/runs/{run}/samples.csv")
+                self.assertEqual((status, headers["Content-Disposition"]), (200, f'attachment; filename="run-{run}.csv"'))
+            too_long = station.request("POST", "/api/v1/runs", {"robot_id": "sim-1", "name": "\U0001f41f" * 51})
+            self.assertEqual(too_long[0], 422)
+
     def test_a_cancelled_job_and_a_killed_station_end_the_program(self):
         with lab() as place:
             self.install(place)

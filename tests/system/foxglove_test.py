@@ -14,7 +14,7 @@ from export_test import read_mcap
 from processes import PATIENT, commanded, lab, wait_until
 
 ON = PATIENT + "[foxglove]\nenabled = true\n"
-OF_A_RUN = ("span", "t_s", "gap_before", "gap_after")
+OF_A_RUN = ("span", "t_s", "gap_before", "gap_after", "missed_ticks_before")
 OF_A_SEGMENT = ("first_received_at_us", "received_at_us", "clock_uncertainty_us", "utc_us")
 
 

@@ -165,6 +165,10 @@ storage::Run counted_run(const json& document) {
   storage::Run run;
   run.samples_expected = document.value("samples_expected", std::uint64_t{0});
   run.samples_lost = document.value("samples_lost", std::uint64_t{0});
+  const json missed = document.value("missed_ticks", json{}), longest = document.value("longest_missed_ticks", json{});
+  if (missed.is_number_unsigned() && longest.is_number_unsigned()) {
+    run.missed = storage::MissedTicks{missed.get<std::uint64_t>(), longest.get<std::uint64_t>()};
+  }
   return run;
 }
 
@@ -187,7 +191,10 @@ Result<void> recompute(const Crate& crate, const std::filesystem::path& scratch,
   auto samples = read_capsule_samples(scratch / kSamplesFile, kMostSamples);
   if (!samples) return std::unexpected{samples.error()};
   RunReport report;
-  report.metrics = json::parse(base::dump(json_of(metrics_of(*samples, counted_run(*run)))));
+  const storage::Run counted = counted_run(*run);
+  report.metrics = json::parse(base::dump(json_of(metrics_of(*samples, counted))));
+  const bool has_missed = metrics->contains(json::json_pointer{"/figures/missed_ticks"});  // not of version 0.9.0
+  if (has_missed) add_missed_ticks(report.metrics, counted);
   compare_metrics(*metrics, report.metrics, found.results);
   for (const storage::StoredSample& stored : samples->samples) report.trace.push_back(trace_point(stored));
   report.reference = std::move(samples->reference);

@@ -27,6 +27,13 @@ bool goes_on(const Watch& watch, std::size_t done, std::size_t runs, storage::Ru
 
 std::unexpected<Error> was_ended() { return fail(ErrorCode::conflict, "cancelled"); }
 
+MetricsOfRun with_missed_ticks(storage::Run run, storage::StoredMetrics metrics, bool is_kept) {
+  json document = json::parse(metrics.document, nullptr, false);
+  add_missed_ticks(document, run);
+  metrics.document = base::dump(document);
+  return {std::move(run), std::move(metrics), is_kept};
+}
+
 // Kinds of events, or none for the run's markers.
 std::vector<std::string> kinds_of(const Alignment& alignment) {
   if (alignment.at == AlignAt::event) return {alignment.name};
@@ -50,7 +57,7 @@ asio::awaitable<Result<MetricsOfRun>> RunDocuments::metrics(storage::RunId id) {
   const auto samples = static_cast<std::int64_t>(run->samples_stored);
   if (is_kept) {
     auto found = co_await parts_.metrics.find(id, kMetricsVersion, samples, *reference_us);
-    if (found) co_return MetricsOfRun{std::move(*run), std::move(*found), true};
+    if (found) co_return with_missed_ticks(std::move(*run), std::move(*found), true);
   }
   const auto computed = co_await parts_.analysis.metrics(*run);
   if (!computed) co_return std::unexpected{computed.error()};
@@ -66,7 +73,7 @@ asio::awaitable<Result<MetricsOfRun>> RunDocuments::metrics(storage::RunId id) {
     const auto stored = co_await parts_.metrics.store(made);
     if (!stored) co_return std::unexpected{stored.error()};
   }
-  co_return MetricsOfRun{std::move(*run), std::move(made), is_kept};
+  co_return with_missed_ticks(std::move(*run), std::move(made), is_kept);
 }
 
 asio::awaitable<Result<json>> RunDocuments::comparison(RunIds ids) {

@@ -138,6 +138,12 @@ json json_of(const RunMetrics& metrics) {
   return out;
 }
 
+void add_missed_ticks(json& metrics, const storage::Run& run) {
+  json& figures = metrics["figures"];
+  figures["missed_ticks"] = run.missed ? json(run.missed->count) : json(nullptr);
+  figures["longest_missed_ticks"] = run.missed ? json(run.missed->longest) : json(nullptr);
+}
+
 json comparison_json(std::span<const storage::Run> runs, std::span<const json> documents) {
   json out{{"runs", json::array()}, {"differing_conditions", differences(runs)}};
   for (const storage::Run& run : runs) out["runs"].push_back({{"run_id", run.id}, {"name", run.conditions.name}});

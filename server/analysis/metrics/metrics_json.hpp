@@ -17,6 +17,10 @@ nlohmann::json json_of(const std::optional<EstimateError>& error);
 nlohmann::json json_of(const MeasuredStep& step);
 nlohmann::json json_of(const RunMetrics& metrics);  // figures by name, steps, estimate_error
 
+// Two figures more, missed_ticks and longest_missed_ticks: they are counted with the run's digest, which may be made
+// after the metrics were stored.
+void add_missed_ticks(nlohmann::json& metrics, const storage::Run& run);
+
 // Each figure, and each measure of each step, over the runs: values, mean, sd, confidence, repeatability limit. Steps
 // are those of every run with the same number and cause; `documents` are what json_of(RunMetrics) gives, one for each
 // run.

@@ -245,6 +245,8 @@ json to_json(const storage::Run& run) {
   out["samples_expected"] = run.samples_expected;
   out["samples_stored"] = run.samples_stored;
   out["samples_lost"] = run.samples_lost;
+  out["missed_ticks"] = run.missed ? json(run.missed->count) : json(nullptr);
+  out["longest_missed_ticks"] = run.missed ? json(run.missed->longest) : json(nullptr);
   return out;
 }
 

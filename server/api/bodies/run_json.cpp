@@ -18,6 +18,8 @@ json to_json(const storage::CurrentDigest& found, storage::RunId run) {
   out["lost_by_cause"] = digest.lost_by_cause;
   out["longest_gap_samples"] = digest.longest_gap_samples;
   out["longest_gap_us"] = digest.longest_gap_us;
+  out["missed_ticks"] = digest.missed ? json(digest.missed->count) : json(nullptr);
+  out["longest_missed_ticks"] = digest.missed ? json(digest.missed->longest) : json(nullptr);
   out["worst_clock_uncertainty_us"] = digest.worst_clock_uncertainty_us;
   out["samples_without_clock"] = digest.samples_without_clock;
   out["sha256"] = found.is_final ? json(digest.sha256) : json(nullptr);

@@ -17,9 +17,16 @@ using base::append_number;
 namespace {
 
 // Those that place a sample, and those of every message.
-constexpr const char* kIntegers[] = {
-    "span",           "seq",        "robot_time_us", "utc_us", "clock_uncertainty_us", "first_received_at_us",
-    "received_at_us", "gap_before", "gap_after"};
+constexpr const char* kIntegers[] = {"span",
+                                     "seq",
+                                     "robot_time_us",
+                                     "utc_us",
+                                     "clock_uncertainty_us",
+                                     "first_received_at_us",
+                                     "received_at_us",
+                                     "gap_before",
+                                     "gap_after",
+                                     "missed_ticks_before"};
 
 constexpr std::pair<const char*, const char*> kDescriptions[] = {
     {"position_m", "believed position plus disturbance_m: the robot's estimate, ± position_sd_m"},
@@ -105,6 +112,8 @@ void TelemetryMessages::append(std::string& out, const SamplePlace& place, const
     append_number(out, in_run->gap_before);
     out += ",\"gap_after\":";
     append_number(out, in_run->gap_after);
+    out += ",\"missed_ticks_before\":";
+    append_number(out, in_run->missed_ticks_before);
   }
   out += end_;
 }

@@ -1,11 +1,12 @@
 // A sample as a message in JSON with its JSON Schema: the same in MCAP files and live for Foxglove.
 //
 //   span, boot_id, seq, robot_time_us, t_s, utc_us, the rows of kSampleFields, those of kBatchFields,
-//   clock_uncertainty_us, first_received_at_us, received_at_us, gap_before, gap_after, unknown_values
+//   clock_uncertainty_us, first_received_at_us, received_at_us, gap_before, gap_after, missed_ticks_before,
+//   unknown_values
 //
 // A value that is none, or not finite, is left out; a number of a sample is the shortest decimal that gives the same
-// binary32 back. What a sample has only as part of a run (span, t_s, gap_before, gap_after) is missing in live
-// messages. The schema says of the position that it is believed, and which member is its ±. No errors.
+// binary32 back. What a sample has only as part of a run (span, t_s, gap_before, gap_after, missed_ticks_before) is
+// missing in live messages. The schema says of the position that it is believed, and which member is its ±. No errors.
 #pragma once
 
 #include <bitset>
@@ -36,6 +37,7 @@ struct SamplePlace {
 struct SampleInRun {
   std::int64_t since_us = 0;                    // since the first sample of its span, written as t_s
   std::uint64_t gap_before = 0, gap_after = 0;  // samples that are missing there
+  std::uint64_t missed_ticks_before = 0;        // at which the robot made no sample
 };
 
 // The messages of samples that share everything but their values; what they share is written once.

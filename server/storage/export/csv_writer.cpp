@@ -94,7 +94,7 @@ std::string CsvWriter::header() const {
     if (number++ == kBeforeTimes) out += ",clock_uncertainty_us,first_received_at_us,received_at_us";
     out += fmt::format(",{}", field.name);
   });
-  return out + ",gap_before,gap_after,unknown_values\n";
+  return out + ",gap_before,gap_after,unknown_values,missed_ticks_before\n";
 }
 
 // What follows the channels, up to gap_before.
@@ -122,7 +122,7 @@ void CsvWriter::append(std::string& out, const ExportSegment& exported) {
   const Segment& segment = exported.part->segment;
   const std::string beginning = fmt::format("{},{},", exported.part->span, exported.part->boot_id);
   const std::string end = shared_text(segment);
-  const std::string last = ',' + quoted(unknown_values(segment.context)) + '\n';
+  const std::string unknown = ',' + quoted(unknown_values(segment.context)) + ',';
   for (std::size_t index = 0; index < segment.samples.size(); ++index) {
     const std::uint64_t robot_time_us = segment.robot_time_us(index);
     out += beginning;
@@ -142,7 +142,9 @@ void CsvWriter::append(std::string& out, const ExportSegment& exported) {
     append_number(out, index == 0 ? exported.gap_before : 0);
     out += ',';
     append_number(out, index + 1 == segment.samples.size() ? exported.gap_after : 0);
-    out += last;
+    out += unknown;
+    append_number(out, index == 0 ? exported.missed_before : 0);
+    out += '\n';
   }
 }
 

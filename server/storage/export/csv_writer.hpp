@@ -1,13 +1,14 @@
 // A run as CSV: a header line with units in the names, then a line per sample, or per step of a uniform grid.
 //
 //   span,boot_id,seq,robot_time_us,t_s,utc,<channels>,<the first four of kBatchFields>,clock_uncertainty_us,
-//   first_received_at_us,received_at_us,<the others>,gap_before,gap_after,unknown_values
+//   first_received_at_us,received_at_us,<the others>,gap_before,gap_after,unknown_values,
+//   missed_ticks_before
 //   span,t_s,utc,<channels>,setpoint_m,mode,gap                                                           (grid)
 //
 // Numbers are the shortest decimals that give the same binary32 back; what is no finite number is an empty field. utc
 // is RFC 3339. gap_before: samples missing right before this one; gap_after: after it, to the end of its span. gap: 1
-// where there is no sample. t_s: seconds since the first sample of the span, on the robot's clock. On the thread that
-// owns the database handle.
+// where there is no sample. missed_ticks_before: ticks at which the robot made no sample, right before this one. t_s:
+// seconds since the first sample of the span, on the robot's clock. On the thread that owns the database handle.
 #pragma once
 
 #include <SQLiteCpp/SQLiteCpp.h>

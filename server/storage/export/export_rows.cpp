@@ -52,13 +52,17 @@ std::uint64_t PagedSegments::gap_after() const {
 std::optional<ExportSegment> SegmentRows::next() {
   const SpanSegment* const part = segments_.first();
   if (part == nullptr) return std::nullopt;
+  const Segment& segment = part->segment;
   if (span_ != part->span) {
     next_seq_ = part->span_first_seq;
-    begin_us_ = part->segment.first_robot_time_us;
+    last_.reset();
+    begin_us_ = segment.first_robot_time_us;
   }
   span_ = part->span;
-  const ExportSegment found{part, part->segment.first_seq - next_seq_, segments_.gap_after(), begin_us_};
-  next_seq_ = part->segment.next_seq();
+  const ExportSegment found{part, segment.first_seq - next_seq_, segments_.gap_after(),
+                            last_ ? missed_ticks(*last_, first_tick(segment)) : 0, begin_us_};
+  next_seq_ = segment.next_seq();
+  last_ = last_tick(segment);
   segments_.pass();
   return found;
 }

@@ -25,9 +25,10 @@ struct ExportQuery {
 // Samples that share everything but their values, as an export writes them.
 struct ExportSegment {
   const SpanSegment* part = nullptr;
-  std::uint64_t gap_before = 0;  // samples that are missing right before the first of them
-  std::uint64_t gap_after = 0;   // and after the last of them, to the end of the span
-  std::uint64_t begin_us = 0;    // robot time of the first sample of the span, from which t_s counts
+  std::uint64_t gap_before = 0;     // samples that are missing right before the first of them
+  std::uint64_t gap_after = 0;      // and after the last of them, to the end of the span
+  std::uint64_t missed_before = 0;  // ticks that the robot missed right before the first of them
+  std::uint64_t begin_us = 0;       // robot time of the first sample of the span, from which t_s counts
 
   std::int64_t since_us(std::uint64_t robot_time_us) const {
     return static_cast<std::int64_t>(robot_time_us - begin_us);
@@ -71,6 +72,7 @@ class SegmentRows {
   PagedSegments segments_;
   std::optional<std::uint32_t> span_;
   std::uint64_t next_seq_ = 0;
+  std::optional<Tick> last_;    // of the segment before, if it is of the span
   std::uint64_t begin_us_ = 0;  // of the span, robot time
 };
 

@@ -30,10 +30,11 @@ constexpr int kPlaceColumnCount = 9, kSeqColumn = 3, kClockColumn = 7;  // count
 constexpr const char* kOtherColumns =
     R"sql(  gap_before INTEGER NOT NULL,             -- samples that are missing right before this one
   gap_after INTEGER NOT NULL,              -- and after it, to the end of its span
-  unknown_values TEXT                      -- JSON: numbers of enumerators that are 'unknown'; NULL: there are none
+  unknown_values TEXT,                     -- JSON: numbers of enumerators that are 'unknown'; NULL: there are none
+  missed_ticks_before INTEGER NOT NULL     -- ticks at which the robot made no sample, right before this one
 );
 )sql";
-constexpr int kOtherColumnCount = 3;
+constexpr int kOtherColumnCount = 4;
 constexpr int kGapColumn =
     kPlaceColumnCount + static_cast<int>(station::kSampleFieldCount + station::kBatchFieldCount) + 1;
 
@@ -121,7 +122,10 @@ void RunFile::add(const ExportSegment& exported) {
     bind_value(*insert_, ++column, static_cast<std::int64_t>(robot_time_us) + segment.utc_offset_us);
     column = kPlaceColumnCount;
     for (const float value : values_of(segment.samples[index])) bind_value(*insert_, ++column, value);
-    if (index <= 1) bind_value(*insert_, kGapColumn, signed_seq(index == 0 ? exported.gap_before : 0));
+    if (index <= 1) {
+      bind_value(*insert_, kGapColumn, signed_seq(index == 0 ? exported.gap_before : 0));
+      bind_value(*insert_, kGapColumn + 3, signed_seq(index == 0 ? exported.missed_before : 0));
+    }
     if (index + 1 == segment.samples.size()) bind_value(*insert_, kGapColumn + 1, signed_seq(exported.gap_after));
     insert_->exec();
     insert_->reset();

@@ -2,10 +2,11 @@
 //
 // Tables: run, span, sample, gap, boot, clock, event, command, audit, marker, run_certificate, in_force,
 // outside_reference, outside_position; columns as in the station's views (docs/database.md), ids above 2^63 as text.
-// `sample` has a row per sample in order of span and seq, with t_s, gap_before and gap_after. The station's views are
-// there under their names, over these tables, and `about` explains every table, view and column. `audit` has the
-// entries from the run's beginning to its end without a hole, so that the chain can be verified; of other robots and of
-// accounts only the hashes. Its application_id is the station's plus 1, so no station takes it for its database.
+// `sample` has a row per sample in order of span and seq, with t_s, gap_before, gap_after and missed_ticks_before. The
+// station's views are there under their names, over these tables, and `about` explains every table, view and column.
+// `audit` has the entries from the run's beginning to its end without a hole, so that the chain can be verified; of
+// other robots and of accounts only the hashes. Its application_id is the station's plus 1, so no station takes it for
+// its database.
 //
 // On the thread that owns the database handle. Throws when the disk does not take it; what it wrote is no whole file
 // before advance() has returned false.

@@ -91,6 +91,7 @@ constexpr Meaning kMeanings[] = {
     {"", "unknown_values",
      "JSON: numbers of values that are given as 'unknown', since the station is older than the"
      " robot's firmware; NULL: there are none"},
+    {"", "missed_ticks_before", "ticks at which the robot made no sample, right before this one"},
 
     // Run.
     {"run", "name", "name of the run"},
@@ -180,6 +181,8 @@ constexpr Meaning kMeanings[] = {
     {"", "longest_gap_us", "longest stretch without a sample, in time"},
     {"", "worst_clock_uncertainty_us", "largest clock_uncertainty_us; -1: no sample has an estimate"},
     {"", "samples_without_clock", "samples without an estimate of UTC"},
+    {"", "missed_ticks", "ticks at which the robot made no sample; NULL: not counted"},
+    {"", "longest_missed_ticks", "of them, the most in a row"},
     {"", "sha256", "SHA-256 of the document"},
     {"run_certificate", "sha256", "SHA-256 of the samples (docs/database.md)"},
     {"outside_reference", "sha256", "SHA-256 of the text that was imported"},

@@ -62,6 +62,13 @@ struct RunSpan {
   std::optional<std::uint64_t> last_seq;  // inclusive; empty while the span is open
 };
 
+// Ticks of the robot's loop at which it made no sample. None is lost by that, and seq goes on without a gap.
+struct MissedTicks {
+  std::uint64_t count = 0;
+  std::uint64_t longest = 0;  // in a row
+  bool operator==(const MissedTicks&) const = default;
+};
+
 struct Run {
   RunId id = 0;
   station::RobotId robot_id;
@@ -78,7 +85,8 @@ struct Run {
   std::vector<RunSpan> spans;
   std::uint64_t samples_expected = 0;  // so far, in all spans
   std::uint64_t samples_stored = 0;
-  std::uint64_t samples_lost = 0;  // known to be lost for good; expected - stored - lost is still on its way
+  std::uint64_t samples_lost = 0;     // known to be lost for good; expected - stored - lost is still on its way
+  std::optional<MissedTicks> missed;  // counted with the digest, when the run has ended; none: not yet
 };
 
 // What a run was made with, as far as it is known.

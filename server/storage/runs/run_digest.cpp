@@ -84,7 +84,8 @@ bool RunDigest::agrees_with(const RunDigest& other) const {
                     one.longest_gap_samples, one.longest_gap_us, one.worst_clock_uncertainty_us,
                     one.samples_without_clock, one.sha256);
   };
-  return all(*this) == all(other);
+  const bool both_counted = missed && other.missed;
+  return all(*this) == all(other) && (!both_counted || missed == other.missed);
 }
 
 SampleHash::SampleHash(int format) : format_{format} {
@@ -120,26 +121,28 @@ void SampleTally::begin_span(Interval samples, std::uint32_t period_us) {
   span_ = samples;
   next_seq_ = samples.first;
   period_us_ = period_us;
-  has_sample_ = false;
+  last_.reset();
   counts_.samples_expected += samples.next - samples.first;
 }
 
 void SampleTally::add(const Stretch& stretch) {
   const std::uint64_t samples = stretch.samples.next - stretch.samples.first;
-  const auto robot_time_us = static_cast<std::int64_t>(stretch.first_robot_time_us);
+  const Tick first{stretch.samples.first, stretch.first_robot_time_us, stretch.period_us};
   const bool is_backfill = (stretch.flags & rheonaut_TELEMETRY_FLAG_BACKFILL) != 0;
   period_us_ = stretch.period_us;
-  if (stretch.samples.first > next_seq_) {
-    const std::uint64_t missing = stretch.samples.first - next_seq_;
-    note_gap(missing, has_sample_ ? robot_time_us - next_robot_time_us_
-                                  : static_cast<std::int64_t>(missing * stretch.period_us));
+  if (first.seq > next_seq_) {
+    const std::uint64_t missing = first.seq - next_seq_;
+    note_gap(missing, static_cast<std::int64_t>(last_ ? first.robot_time_us - last_->robot_time_us - last_->period_us
+                                                      : missing * stretch.period_us));
   }
+  const std::uint64_t ticks = last_ ? missed_ticks(*last_, first) : 0;
+  counts_.missed->count += ticks;
+  counts_.missed->longest = std::max(counts_.missed->longest, ticks);
   (is_backfill ? counts_.samples_backfilled : counts_.samples_live) += samples;
   if (stretch.clock_uncertainty_us < 0) counts_.samples_without_clock += samples;
   counts_.worst_clock_uncertainty_us = std::max(counts_.worst_clock_uncertainty_us, stretch.clock_uncertainty_us);
   next_seq_ = stretch.samples.next;
-  next_robot_time_us_ = robot_time_us + static_cast<std::int64_t>(samples * stretch.period_us);
-  has_sample_ = true;
+  last_ = Tick{next_seq_ - 1, first.robot_time_us + (samples - 1) * stretch.period_us, stretch.period_us};
 }
 
 void SampleTally::add_lost(Interval samples, const std::string& cause) {

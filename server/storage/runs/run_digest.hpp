@@ -45,11 +45,12 @@ struct RunDigest {
   std::uint64_t samples_without_clock = 0;
   std::string sha256;  // in lower-case hexadecimal
   std::int64_t made_at_us = 0;
+  std::optional<MissedTicks> missed;  // none: made by a version that did not count them
 
   std::uint64_t samples_missing() const {  // still on their way
     return samples_expected - samples_live - samples_backfilled - samples_lost;
   }
-  // Says the same of the samples; when it was made does not count.
+  // Says the same of the samples; when it was made does not count, nor what one of them has not counted.
   bool agrees_with(const RunDigest& other) const;
 };
 
@@ -86,12 +87,11 @@ class SampleTally {
  private:
   void note_gap(std::uint64_t samples, std::int64_t us);
 
-  RunDigest counts_;
+  RunDigest counts_{.lost_by_cause = {}, .sha256 = {}, .missed = MissedTicks{}};
   Interval span_;
-  std::uint64_t next_seq_ = 0;           // of the span: above the last stored sample
-  std::int64_t next_robot_time_us_ = 0;  // at which that one is due
+  std::uint64_t next_seq_ = 0;  // of the span: above the last stored sample
+  std::optional<Tick> last_;    // of the span: the last stored sample
   std::uint32_t period_us_ = 0;
-  bool has_sample_ = false;
 };
 
 // One span of a closed run.
@@ -151,5 +151,8 @@ std::optional<RunDigest> read_digest(SQLite::Database& database, RunId run);
 
 // Does nothing when the run has been discarded meanwhile.
 void write_digest(SQLite::Database& database, RunId run, const RunDigest& digest);
+
+// Into a digest that has not counted them, if it is of as many stored samples.
+void write_missed_ticks(SQLite::Database& database, RunId run, const RunDigest& counts);
 
 }  // namespace server::storage

@@ -1,6 +1,8 @@
 // Reads digests from the database and writes them.
 #include <algorithm>
 #include <nlohmann/json.hpp>
+#include <optional>
+#include <tuple>
 
 #include "server/storage/database/statement.hpp"
 #include "server/storage/runs/run_digest.hpp"
@@ -10,6 +12,7 @@ namespace server::storage {
 namespace {
 
 constexpr std::uint64_t kTalliedSamples = 1'000'000;  // whose heads are read at once
+constexpr int kColumnsBeforeSchema12 = 13;
 
 struct Lost {
   Interval samples;
@@ -128,36 +131,47 @@ bool HeadTally::advance(SQLite::Database& database) {
 }
 
 std::optional<RunDigest> read_digest(SQLite::Database& database, RunId run) {
-  SQLite::Statement row{database,
-                        "SELECT samples_expected, samples_live, samples_backfilled, samples_lost, lost_by_cause,"
-                        " longest_gap_samples, longest_gap_us, worst_clock_uncertainty_us, samples_without_clock,"
-                        " sha256, made_at_us, format FROM run_certificate WHERE run_id = ? AND format BETWEEN 1 AND ?"};
+  SQLite::Statement row{database, "SELECT * FROM run_certificate WHERE run_id = ? AND format BETWEEN 1 AND ?"};
   bind_all(row, run, std::int64_t{kDigestFormat});
   if (!row.executeStep()) return std::nullopt;
   RunDigest digest;
-  digest.samples_expected = unsigned_id(row.getColumn(0));
-  digest.samples_live = unsigned_id(row.getColumn(1));
-  digest.samples_backfilled = unsigned_id(row.getColumn(2));
-  digest.samples_lost = unsigned_id(row.getColumn(3));
-  digest.lost_by_cause = causes_from(row.getColumn(4).getString());
-  digest.longest_gap_samples = unsigned_id(row.getColumn(5));
-  digest.longest_gap_us = row.getColumn(6).getInt64();
-  digest.worst_clock_uncertainty_us = row.getColumn(7).getInt64();
-  digest.samples_without_clock = unsigned_id(row.getColumn(8));
-  digest.sha256 = row.getColumn(9).getString();
-  digest.made_at_us = row.getColumn(10).getInt64();
-  digest.format = row.getColumn(11).getInt();
+  digest.format = row.getColumn("format").getInt();
+  digest.samples_expected = unsigned_id(row.getColumn("samples_expected"));
+  digest.samples_live = unsigned_id(row.getColumn("samples_live"));
+  digest.samples_backfilled = unsigned_id(row.getColumn("samples_backfilled"));
+  digest.samples_lost = unsigned_id(row.getColumn("samples_lost"));
+  digest.lost_by_cause = causes_from(row.getColumn("lost_by_cause").getString());
+  digest.longest_gap_samples = unsigned_id(row.getColumn("longest_gap_samples"));
+  digest.longest_gap_us = row.getColumn("longest_gap_us").getInt64();
+  digest.worst_clock_uncertainty_us = row.getColumn("worst_clock_uncertainty_us").getInt64();
+  digest.samples_without_clock = unsigned_id(row.getColumn("samples_without_clock"));
+  digest.sha256 = row.getColumn("sha256").getString();
+  digest.made_at_us = row.getColumn("made_at_us").getInt64();
+  const bool is_before_schema_12 = row.getColumnCount() <= kColumnsBeforeSchema12;  // `verify` reads those as they are
+  if (!is_before_schema_12 && !row.isColumnNull("missed_ticks")) {
+    digest.missed =
+        MissedTicks{unsigned_id(row.getColumn("missed_ticks")), unsigned_id(row.getColumn("longest_missed_ticks"))};
+  }
   return digest;
+}
+
+void write_missed_ticks(SQLite::Database& database, RunId run, const RunDigest& counts) {
+  SQLite::Statement add{database,
+                        "UPDATE run_certificate SET missed_ticks = ?, longest_missed_ticks = ?"
+                        " WHERE run_id = ? AND missed_ticks IS NULL AND samples_live + samples_backfilled = ?"};
+  execute(add, counts.missed->count, counts.missed->longest, run, counts.samples_live + counts.samples_backfilled);
 }
 
 void write_digest(SQLite::Database& database, RunId run, const RunDigest& digest) {
   SQLite::Statement add{database,
-                        "INSERT OR REPLACE INTO run_certificate SELECT ?,?,?,?,?,?,?,?,?,?,?,?,?"
+                        "INSERT OR REPLACE INTO run_certificate SELECT ?,?,?,?,?,?,?,?,?,?,?,?,?,?,?"
                         " WHERE EXISTS (SELECT 1 FROM run WHERE run_id = ?1 AND state IN ('ended', 'interrupted'))"};
+  std::optional<std::uint64_t> missed, longest;
+  if (digest.missed) std::tie(missed, longest) = std::tuple{digest.missed->count, digest.missed->longest};
   execute(add, run, std::int64_t{digest.format}, digest.samples_expected, digest.samples_live,
           digest.samples_backfilled, digest.samples_lost, json_of(digest.lost_by_cause).dump(),
           digest.longest_gap_samples, digest.longest_gap_us, digest.worst_clock_uncertainty_us,
-          digest.samples_without_clock, digest.sha256, digest.made_at_us);
+          digest.samples_without_clock, digest.sha256, digest.made_at_us, missed, longest);
 }
 
 }  // namespace server::storage

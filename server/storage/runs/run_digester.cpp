@@ -43,18 +43,25 @@ Page next_page(SQLite::Database& database, RunId run, std::optional<DigestComput
   return page;
 }
 
-// Runs that ended before the last stop of the station, or under a version that made no digests.
-std::vector<RunId> runs_without_digest(SQLite::Database& database) {
+std::vector<RunId> runs_with(SQLite::Database& database, const char* condition) {
   std::vector<RunId> runs;
   try {
-    SQLite::Statement rows{database,
-                           "SELECT run_id FROM run WHERE state IN ('ended', 'interrupted')"
-                           " AND NOT EXISTS (SELECT 1 FROM run_certificate WHERE run_id = run.run_id)"};
+    SQLite::Statement rows{database, fmt::format("SELECT run_id FROM run LEFT JOIN run_certificate USING (run_id)"
+                                                 " WHERE state IN ('ended', 'interrupted') AND {}",
+                                                 condition)};
     while (rows.executeStep()) runs.push_back(rows.getColumn(0).getInt64());
   } catch (const SQLite::Exception& error) {
     spdlog::error("runs without a digest cannot be looked for: {}", runtime::text_of(error));
   }
   return runs;
+}
+
+// Runs that ended before the last stop of the station, or under a version that made no digests.
+std::vector<RunId> runs_without_digest(SQLite::Database& database) { return runs_with(database, "format IS NULL"); }
+
+// Runs with the digest of a version that did not count what the robot missed; the newest comes last.
+std::vector<RunId> runs_not_counted(SQLite::Database& database) {
+  return runs_with(database, "format IS NOT NULL AND missed_ticks IS NULL ORDER BY run_id");
 }
 
 }  // namespace
@@ -65,12 +72,31 @@ RunDigester::RunDigester(runtime::Clock& clock, Recorder& recorder, DatabaseRead
 asio::awaitable<void> RunDigester::run() {
   const std::vector<RunId> runs = co_await reader_.ask(runs_without_digest);
   for (const RunId run : runs) add(run);
+  std::vector<RunId> not_counted = co_await reader_.ask(runs_not_counted);
   for (;;) {
-    co_await wait_until_due();
     const auto due = std::ranges::min_element(pending_, {}, [](const auto& entry) { return entry.second.due_us; });
-    if (due == pending_.end() || due->second.due_us > clock_.steady_us()) continue;
-    co_await look_at(due->first);
+    if (due != pending_.end() && due->second.due_us <= clock_.steady_us()) {
+      co_await look_at(due->first);
+    } else if (!not_counted.empty()) {  // while nothing else is to be done
+      const RunId run = not_counted.back();
+      not_counted.pop_back();
+      co_await count_missed_ticks(run);
+    } else {
+      co_await wait_until_due();
+    }
   }
+}
+
+asio::awaitable<void> RunDigester::count_missed_ticks(RunId run) {
+  RunDigest counts = co_await count(run);
+  auto job = [run, counts = std::move(counts)](Database& database) {
+    try {
+      write_missed_ticks(database.handle(), run, counts);
+    } catch (const SQLite::Exception&) {  // as in store(); counted after the next start
+    }
+    return true;
+  };
+  co_await recorder_.on_disk(std::move(job));
 }
 
 void RunDigester::add(RunId run) {

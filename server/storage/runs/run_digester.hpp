@@ -49,6 +49,7 @@ class RunDigester {
 
   boost::asio::awaitable<void> wait_until_due();
   boost::asio::awaitable<void> look_at(RunId run);
+  boost::asio::awaitable<void> count_missed_ticks(RunId run);
   boost::asio::awaitable<bool> store(RunId run, RunDigest digest);
   boost::asio::awaitable<std::optional<RunDigest>> stored(RunId run);
   boost::asio::awaitable<RunDigest> count(RunId run);

@@ -66,6 +66,9 @@ class RunReading {
     run.samples_expected = unsigned_id(digest_.getColumn(0));
     run.samples_stored = unsigned_id(digest_.getColumn(1));
     run.samples_lost = unsigned_id(digest_.getColumn(2));
+    if (!digest_.isColumnNull(3)) {
+      run.missed = MissedTicks{unsigned_id(digest_.getColumn(3)), unsigned_id(digest_.getColumn(4))};
+    }
     return true;
   }
 
@@ -93,8 +96,8 @@ class RunReading {
   SQLite::Database& database_;
   const BootHeads& heads_;
   SQLite::Statement digest_{database_,
-                            "SELECT samples_expected, samples_live + samples_backfilled, samples_lost"
-                            " FROM run_certificate WHERE run_id = ?"};
+                            "SELECT samples_expected, samples_live + samples_backfilled, samples_lost, missed_ticks,"
+                            " longest_missed_ticks FROM run_certificate WHERE run_id = ?"};
   SQLite::Statement spans_{database_,
                            "SELECT boot_key, boot_id, first_seq, last_seq, durable_next_seq"
                            " FROM run_span JOIN boot USING (boot_key) WHERE run_id = ? ORDER BY span"};

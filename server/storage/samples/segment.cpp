@@ -31,6 +31,23 @@ Segment part_of(const Segment& segment, Interval range) {
   return part;
 }
 
+Tick first_tick(const Segment& segment) {
+  return {segment.first_seq, segment.first_robot_time_us, segment.context.period_us};
+}
+
+Tick last_tick(const Segment& segment) {
+  const std::size_t last = segment.samples.size() - 1;
+  return {segment.first_seq + last, segment.robot_time_us(last), segment.context.period_us};
+}
+
+std::uint64_t missed_ticks(const Tick& before, const Tick& after) {
+  const std::uint64_t period_us = std::max(before.period_us, after.period_us);
+  if (period_us == 0 || after.robot_time_us <= before.robot_time_us) return 0;
+  const std::uint64_t ticks = (after.robot_time_us - before.robot_time_us + period_us / 2) / period_us;
+  const std::uint64_t made = after.seq - before.seq;
+  return ticks > made ? ticks - made : 0;
+}
+
 station::Sample as_stored(const station::Sample& sample) {
   station::Sample stored;
   station::for_each_sample_field(

@@ -33,6 +33,19 @@ struct Segment {
 // The samples of the segment in a range that holds at least one of them. Times of receipt stay those of the segment.
 Segment part_of(const Segment& segment, Interval range);
 
+// A tick of the robot's loop at which it made a sample.
+struct Tick {
+  std::uint64_t seq = 0;
+  std::uint64_t robot_time_us = 0;
+  std::uint32_t period_us = 0;
+};
+Tick first_tick(const Segment& segment);
+Tick last_tick(const Segment& segment);
+
+// How many ticks the robot missed between two samples of one boot: it made no sample there, so none is lost. Where the
+// period changed in between, the longer one counts. Times are right to a fraction of a period.
+std::uint64_t missed_ticks(const Tick& before, const Tick& after);
+
 // The sample as the database gives it back: NaN for what is not finite, and no negative zero.
 station::Sample as_stored(const station::Sample& sample);
 

@@ -47,7 +47,7 @@ std::string difference(const RunDigest& found, const RunDigest& stored) {
   if (found.sha256 != stored.sha256) {
     return number("its samples were changed: their SHA-256", found.sha256, stored.sha256);
   }
-  return "its longest gap or its clock is not that of the certificate";
+  return "its longest gap, the ticks that the robot missed or its clock is not that of the certificate";
 }
 
 // Whether the extremes of the segment ?1, ?2 are those of the rows ?3 to ?4, in a database of this schema version.

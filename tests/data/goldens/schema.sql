@@ -220,7 +220,7 @@ CREATE TABLE run_certificate (
   samples_without_clock INTEGER NOT NULL,
   sha256 TEXT NOT NULL,             -- of the samples, in lower-case hexadecimal
   made_at_us INTEGER NOT NULL
-);
+, missed_ticks INTEGER, longest_missed_ticks INTEGER);
 CREATE VIEW run_marker AS
 SELECT run_span.run_id, run_span.span, marker.marker_id, printf('%llu', boot.boot_id) AS boot_id, marker.seq,
   marker.text, marker.actor, marker.made_at_us

@@ -78,7 +78,7 @@ class ExportTest : public RandomRecordingTest {
       const std::uint64_t expected = follows ? last->seq + 1 : spans.at(stored.span).samples.first;
       if (last && !follows) lines.back() += after_text(spans.at(last->span), *last);
       if (follows) lines.back() += " 0";
-      lines.push_back(line_of(stored, stored.seq - expected));
+      lines.push_back(line_of(stored, follows ? missed_between(*last, stored) : 0, stored.seq - expected));
       last = stored;
     }
     if (last) lines.back() += after_text(spans.at(last->span), *last);
@@ -88,8 +88,16 @@ class ExportTest : public RandomRecordingTest {
     return fmt::format(" {}", span.made().next - last.seq - 1);
   }
 
+  // Of two of one span: the ticks at which nothing was made, by the longer period of both.
+  static std::uint64_t missed_between(const storage::StoredSample& before, const storage::StoredSample& after) {
+    const double period_us = std::max(before.period_us, after.period_us);
+    const auto us = static_cast<double>(after.robot_time_us - before.robot_time_us);
+    return static_cast<std::uint64_t>(
+        std::max(0.0, std::round(us / period_us) - static_cast<double>(after.seq - before.seq)));
+  }
+
   // Without gap_after.
-  static std::string line_of(const storage::StoredSample& stored, std::uint64_t gap_before) {
+  static std::string line_of(const storage::StoredSample& stored, std::uint64_t missed, std::uint64_t gap_before) {
     std::vector<std::string> fields{
         fmt::format("{} {} {} {} {}", stored.span, stored.boot_id, stored.seq, stored.robot_time_us, stored.utc_us)};
     for (const auto member : storage::kSampleMembers) fields.push_back(bits(stored.sample.*member));
@@ -99,9 +107,9 @@ class ExportTest : public RandomRecordingTest {
     fields.push_back(
         fmt::format("{} {} {}", stored.clock_uncertainty_us, stored.first_received_at_us, stored.received_at_us));
     fields.push_back(bits(station::or_nan(stored.position_sd_m)));
-    fields.push_back(fmt::format("{} {} {} {} {} {}", stored.controller_id, stored.emergency_id,
+    fields.push_back(fmt::format("{} {} {} {} {} {} {}", stored.controller_id, stored.emergency_id,
                                  protocol::text(stored.emergency_cause), stored.flags,
-                                 unknown_values(stored).value_or("none"), gap_before));
+                                 unknown_values(stored).value_or("none"), missed, gap_before));
     return joined(fields);
   }
 
@@ -113,10 +121,12 @@ class ExportTest : public RandomRecordingTest {
               "span,boot_id,seq,robot_time_us,t_s,utc,position_m,velocity_m_s,acceleration_m_s2,duty,impedance_mv,"
               "reference_m,mode,sub_state,setpoint_m,disturbance_m,clock_uncertainty_us,first_received_at_us,"
               "received_at_us,position_sd_m,controller_id,emergency_id,emergency_cause,flags,gap_before,gap_after,"
-              "unknown_values");
+              "unknown_values,missed_ticks_before");
     Lines lines;
     SpanTimes times;
     while (std::getline(in, line)) {
+      const std::string missed = line.substr(line.rfind(',') + 1);
+      line.resize(line.rfind(','));
       const std::size_t end = line.find(",\"{") != std::string::npos ? line.find(",\"{") : line.size() - 1;
       std::string unknown = line.substr(end + 1);  // {""mode"":17} in quotation marks, or nothing
       if (!unknown.empty()) unknown = unknown.substr(1, unknown.size() - 2);
@@ -130,7 +140,7 @@ class ExportTest : public RandomRecordingTest {
       if (fields.at(17).empty()) fields.at(17) = "0";  // not known yet when its segment had arrived
       for (const std::size_t column : {5U, 6U, 7U, 8U, 9U, 10U, 13U, 14U, 18U})
         fields.at(column) = bits_of(fields.at(column));
-      fields.insert(fields.end() - 2, unknown.empty() ? "none" : unknown);
+      fields.insert(fields.end() - 2, {unknown.empty() ? "none" : unknown, missed});
       lines.push_back(joined(fields));
     }
     return lines;
@@ -170,7 +180,9 @@ class ExportTest : public RandomRecordingTest {
   static Lines gaps_in(const std::filesystem::path& file) {
     SQLite::Database database{file.string(), SQLite::OPEN_READONLY};
     SQLite::Statement query{
-        database, "SELECT gap_before || ' ' || gap_after, span, robot_time_us, t_s FROM sample ORDER BY rowid"};
+        database,
+        "SELECT missed_ticks_before || ' ' || gap_before || ' ' || gap_after, span, robot_time_us, t_s FROM sample"
+        " ORDER BY rowid"};
     Lines lines;
     SpanTimes times;
     while (query.executeStep()) {
@@ -257,9 +269,10 @@ class ExportTest : public RandomRecordingTest {
                                .add("sub_state", static_cast<protocol::SubState>(number("sub_state", row)))
                                .add("emergency_cause", cause)
                                .text();
-      fields.push_back(fmt::format("{} {} {} {} {} {} {}", number("controller_id", row), id("emergency_id", row),
+      fields.push_back(fmt::format("{} {} {} {} {} {} {} {}", number("controller_id", row), id("emergency_id", row),
                                    text_of("emergency_cause_text", row), number("flags", row), unknown.value_or("none"),
-                                   number("gap_before", row), number("gap_after", row)));
+                                   number("missed_ticks_before", row), number("gap_before", row),
+                                   number("gap_after", row)));
       lines.push_back(joined(fields));
     }
     return lines;
@@ -319,17 +332,20 @@ class ExportTest : public RandomRecordingTest {
   }
 };
 
-// Without the last fields, gap_before and gap_after, which only exports have.
+// Without the last fields, missed_ticks_before, gap_before and gap_after, which only exports have.
 inline Lines without_gaps(Lines lines) {
   for (std::string& line : lines) {
-    for (int field = 0; field < 2; ++field) line.resize(line.rfind(' '));
+    for (int field = 0; field < 3; ++field) line.resize(line.rfind(' '));
   }
   return lines;
 }
 
 inline Lines gaps_of(const Lines& lines) {
   Lines gaps;
-  for (const std::string& line : lines) gaps.push_back(line.substr(line.rfind(' ', line.rfind(' ') - 1) + 1));
+  for (const std::string& line : lines) {
+    const std::size_t gaps_at = line.rfind(' ', line.rfind(' ') - 1);
+    gaps.push_back(line.substr(line.rfind(' ', gaps_at - 1) + 1));
+  }
   return gaps;
 }
 

@@ -4,6 +4,9 @@
 #include <gtest/gtest.h>
 
 #include <random>
+#include <utility>
+
+#include "server/storage/runs/run_digest.hpp"
 
 namespace server {
 namespace {
@@ -64,6 +67,55 @@ TEST(SegmentRows, CountTheSamplesThatAreMissingBeforeThem) {
   EXPECT_EQ(rows.next()->gap_before, 0u);
   EXPECT_EQ(rows.next()->gap_before, 1u);
   EXPECT_FALSE(rows.next().has_value());
+}
+
+TEST(SegmentRows, CountTheTicksThatTheRobotMissed) {
+  storage::SegmentRows rows;
+  rows.give(page({segment(0, 5, 0, 3), segment(0, 8, 90'000, 1), segment(0, 12, 140'100, 1),
+                  segment(0, 13, 160'000, 1, 20'000), segment(0, 14, 240'000, 1, 20'000), segment(1, 5, 900'000, 1)}));
+  EXPECT_EQ(rows.next()->missed_before, 0u);
+  EXPECT_EQ(rows.next()->missed_before, 6u);
+  const storage::ExportSegment after_gap = *rows.next();
+  EXPECT_EQ(after_gap.gap_before, 3u);
+  EXPECT_EQ(after_gap.missed_before, 1u) << "of five ticks four made a sample";
+  EXPECT_EQ(rows.next()->missed_before, 0u) << "the period became longer";
+  EXPECT_EQ(rows.next()->missed_before, 3u);
+  EXPECT_EQ(rows.next()->missed_before, 0u) << "another span";
+}
+
+// Ticks at random with a sample each, or none; samples at random that are lost; segments that are cut at random.
+TEST(SegmentRows, CountAsManyMissedTicksAsARecountAndAsTheDigest) {
+  std::mt19937 random{12};
+  for (int round = 0; round < 200; ++round) {
+    std::vector<storage::SpanSegment> parts;
+    std::uint64_t seq = 5, missed = 0, since_stored = 0, longest = 0;
+    for (std::uint64_t tick = 0; tick < 200; ++tick) {
+      const std::uint64_t time_us = 500'000 + tick * 10'000 + random() % 1000;
+      if (random() % 10 == 0) {
+        if (!parts.empty()) ++since_stored;
+        continue;
+      }
+      const std::uint64_t made = seq++;
+      if (random() % 10 == 0) continue;
+      parts.push_back(segment(0, made, time_us, 1));
+      missed += since_stored;
+      longest = std::max(longest, std::exchange(since_stored, 0));
+    }
+    storage::SampleTally tally;
+    tally.begin_span({5, seq}, 10'000);
+    for (const storage::SpanSegment& part : parts) {
+      tally.add({.samples = part.segment.interval(),
+                 .first_robot_time_us = part.segment.first_robot_time_us,
+                 .period_us = 10'000});
+    }
+    tally.end_span();
+    std::uint64_t exported = 0;
+    storage::SegmentRows rows;
+    rows.give(page(std::move(parts)));
+    while (const auto row = rows.next()) exported += row->missed_before;
+    ASSERT_EQ(exported, missed) << round;
+    ASSERT_EQ(tally.counts().missed, (storage::MissedTicks{.count = missed, .longest = longest})) << round;
+  }
 }
 
 // The position of each row of the grid, -1 in a gap.

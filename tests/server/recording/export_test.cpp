@@ -87,7 +87,7 @@ TEST_F(ExportTest, LossesAtTheEndOfASpanShowInEveryFormat) {
       EXPECT_TRUE(lines[99].ends_with(" 0 30")) << lines[99];
       EXPECT_TRUE(lines[149].ends_with(" 0 0")) << lines[149];
     }
-    EXPECT_EQ(gaps_in(run_file(run)).at(99), "0 30");
+    EXPECT_EQ(gaps_in(run_file(run)).at(99), "0 0 30");
     std::istringstream grid{csv({.run = run, .channels = storage::all_channels(), .grid_us = 10'000})};
     Lines rows;
     for (std::string line; std::getline(grid, line);) rows.push_back(line);

@@ -212,7 +212,7 @@ TEST_F(RunDigestTest, AThousandRunsAreListedFromTheirDigestsWithoutASegment) {
       "1;"
       "INSERT INTO run_certificate SELECT i, format, samples_expected, samples_live, samples_backfilled, samples_lost,"
       " lost_by_cause, longest_gap_samples, longest_gap_us, worst_clock_uncertainty_us, samples_without_clock, sha256,"
-      " made_at_us FROM run_certificate, n WHERE run_id = 1;"
+      " made_at_us, missed_ticks, longest_missed_ticks FROM run_certificate, n WHERE run_id = 1;"
       "DELETE FROM segment; DELETE FROM gap");
   storage::RunFilter filter;
   filter.limit = 1000;
@@ -224,6 +224,55 @@ TEST_F(RunDigestTest, AThousandRunsAreListedFromTheirDigestsWithoutASegment) {
     ASSERT_EQ(run.samples_lost, 10u);
     ASSERT_EQ(run.spans.size(), 2u);
   }
+}
+
+TEST_F(RunDigestTest, CountsTheTicksThatTheRobotMissedApartFromWhatIsLost) {
+  start();
+  connect(robot_);
+  const storage::RunId id = create();
+  make(robot_, 20);
+  robot_.late_us += 50'000;
+  make(robot_, 20);
+  robot_.late_us += 20'000;
+  make(robot_, 20);
+  EXPECT_EQ(wait(runs_->find(id))->missed, std::nullopt) << "counted with the digest";
+  robot_.late_us += 70'000;
+  reboot();  // what lies between two boots is no tick
+  make(robot_, 20);
+  end(id);
+  const storage::MissedTicks expected{.count = 7, .longest = 5};
+  const storage::RunDigest digest = final_digest(id);
+  EXPECT_EQ(digest.missed, expected);
+  EXPECT_EQ(digest.samples_lost, 0u);
+  EXPECT_EQ(digest.longest_gap_us, 0);
+  EXPECT_EQ(wait(runs_->find(id))->missed, expected);
+}
+
+// A version before this one did not count them. What the digest hashes is the same.
+TEST_F(RunDigestTest, TheTicksOfAnOldDigestAreCountedAfterTheStart) {
+  start();
+  connect(robot_);
+  const storage::RunId id = create();
+  make(robot_, 20);
+  robot_.late_us += 50'000;
+  make(robot_, 20);
+  end(id);
+  const storage::RunDigest before = final_digest(id);
+  ASSERT_EQ(before.missed, (storage::MissedTicks{.count = 5, .longest = 5}));
+  stop();
+  change("UPDATE run_certificate SET missed_ticks = NULL, longest_missed_ticks = NULL");
+  start();
+  clock_.run_for(1s);
+  EXPECT_EQ(wait(runs_->find(id))->missed, before.missed);
+  EXPECT_EQ(final_digest(id).sha256, before.sha256);
+  EXPECT_EQ(final_digest(id).made_at_us, before.made_at_us);
+  stop();
+  change(
+      "UPDATE run_certificate SET missed_ticks = NULL, longest_missed_ticks = NULL;"
+      "DELETE FROM segment WHERE first_seq = (SELECT max(first_seq) FROM segment)");
+  start();
+  clock_.run_for(1s);
+  EXPECT_EQ(wait(runs_->find(id))->missed, std::nullopt) << "not of a part of the samples";
 }
 
 TEST_F(RunDigestTest, ThereIsNoneOfAnOpenOrUnknownRun) {

@@ -64,4 +64,6 @@ test('a run is called complete only when every sample is stored', () => {
   expect(completeness(run(95, 5))).toEqual({ tone: 'caution', text: '5 lost' });
   expect(completeness(run(90, 0))).toEqual({ tone: 'caution', text: '10 missing' });
   expect(completeness({ ...run(90, 0), state: 'open' }).text).toBe('recording');
+  expect(completeness({ ...run(100, 0), missed_ticks: 264 }).text).toBe('complete; 264 missed by the robot');
+  expect(completeness({ ...run(95, 5), missed_ticks: 1 }).text).toBe('5 lost; 1 missed by the robot');
 });

@@ -27,6 +27,8 @@ export const made_run = (said: Partial<Run> = {}): Run => ({
   samples_expected: 100,
   samples_stored: 100,
   samples_lost: 0,
+  missed_ticks: 0,
+  longest_missed_ticks: 0,
   ...said,
 });
 

@@ -30,6 +30,8 @@ const certificate = (said: Partial<Certificate>) =>
     samples_missing: 0,
     lost_by_cause: {},
     longest_gap_samples: 0,
+    missed_ticks: 0,
+    longest_missed_ticks: 0,
     ...said,
   }) as Certificate;
 
@@ -72,6 +74,14 @@ test('"nothing lost" is said only when nothing is lost and nothing is missing', 
     tone: 'caution',
     text: '12 of 4\u202f207 samples are lost (12 ring overrun); the longest gap has 7.',
   });
+  expect(text({ samples_expected: 3803, missed_ticks: 264, longest_missed_ticks: 30 })).toEqual({
+    tone: '',
+    text: 'Recorded, nothing lost: all 3\u202f803 samples. Missed by the robot: 264 ticks, at most 30 in a row.',
+  });
+  expect(text({ samples_lost: 1, lost_by_cause: { reboot: 1 }, missed_ticks: 2, longest_missed_ticks: 1 }).text).toBe(
+    '1 of 4\u202f207 samples are lost (1 reboot). Missed by the robot: 2 ticks, at most 1 in a row.',
+  );
+  expect(text({ missed_ticks: null, longest_missed_ticks: null }).tone).toBe('');
   expect(text({ samples_missing: 3 }).text).toBe('3 are still missing: the robot may send them yet.');
   expect(completeness_text(made_run({ state: 'discarded' }), certificate({})).tone).toBe('caution');
   expect(completeness_text(made_run(), null).text).not.toContain('nothing lost');

@@ -183,6 +183,7 @@ void MatWriter::add_columns() {
   add("received_at_us", Type::float64);
   add("gap_before", Type::float64);
   add("gap_after", Type::float64);
+  add("missed_ticks_before", Type::float64);
 }
 
 // Of the page at hand; true when there are more.
@@ -223,6 +224,7 @@ void MatWriter::push(const ExportSegment& exported) {
     put(static_cast<double>(segment.received_at_us));
     put(index == 0 ? static_cast<double>(exported.gap_before) : 0.0);
     put(index + 1 == segment.samples.size() ? static_cast<double>(exported.gap_after) : 0.0);
+    put(index == 0 ? static_cast<double>(exported.missed_before) : 0.0);
   }
 }
 

@@ -2,11 +2,11 @@
 // vector for each quantity, named as in the CSV.
 //
 // Channels and numbers of a batch (telemetry_fields.hpp) are single and NaN where there is no number; times, seq,
-// gap_before and gap_after are double, which holds them exactly; span, enumerators and counts are uint32, ids uint64.
-// Enumerators are the numbers of the protocol, also those that this version does not know (info.modes spells out those
-// of mode), and beside each its texts as a matrix of characters: mode_text for mode. info.boot_ids has the boots of the
-// spans as uint64. On a grid: span, t_s, utc_us, the channels, setpoint_m, mode, mode_text and gap; 0 and blanks in a
-// gap.
+// gap_before, gap_after and missed_ticks_before are double, which holds them exactly; span, enumerators and counts are
+// uint32, ids uint64. Enumerators are the numbers of the protocol, also those that this version does not know
+// (info.modes spells out those of mode), and beside each its texts as a matrix of characters: mode_text for mode.
+// info.boot_ids has the boots of the spans as uint64. On a grid: span, t_s, utc_us, the channels, setpoint_m, mode,
+// mode_text and gap; 0 and blanks in a gap.
 //
 // On the thread that owns the database handle; no other thread may use matio meanwhile. Errors: invalid when a column
 // would have more than 2 GiB, which the format does not hold. Throws when the disk does not take it.

@@ -88,7 +88,8 @@ void McapWriter::write(const ExportSegment& exported) {
     std::string& out =
         file_.begin_message({telemetry_, static_cast<std::uint32_t>(seq), nanoseconds(utc_us), robot_time_us * 1000});
     const station::SampleInRun in_run{exported.since_us(robot_time_us), index == 0 ? exported.gap_before : 0,
-                                      index + 1 == segment.samples.size() ? exported.gap_after : 0};
+                                      index + 1 == segment.samples.size() ? exported.gap_after : 0,
+                                      index == 0 ? exported.missed_before : 0};
     messages.append(out, {seq, robot_time_us, utc_us}, segment.samples[index], in_run);
     file_.end_message();
   }

@@ -2,7 +2,7 @@
 //
 //   /telemetry  a message per sample: span, boot_id, seq, robot_time_us, t_s, utc_us, the channels, the fields of its
 //               batch, clock_uncertainty_us, first_received_at_us, received_at_us, gap_before, gap_after,
-//               unknown_values
+//               missed_ticks_before, unknown_values
 //   /event  /command  /gap  /marker   the rows of the tables of the SQLite export (run_tables.hpp)
 //
 // Names and values are those of the SQLite export; a value that is none there is left out. A number of a sample is the

@@ -20,6 +20,8 @@ const kFigures: Record<string, Figure> = {
   samples_expected: samples('Samples made'),
   samples_stored: samples('Samples recorded'),
   samples_lost: samples('Samples lost'),
+  missed_ticks: samples('Ticks missed by the robot'),
+  longest_missed_ticks: samples('Most of them in a row'),
   gaps: samples('Gaps'),
   longest_gap_s: time('Longest gap'),
   resent_share: share('Sent again'),

@@ -95,10 +95,11 @@ export function parse_numbers(text: string | undefined): number[] {
 // How complete a run is, as far as its row says.
 export function completeness(run: Run): { tone: string; text: string } {
   const missing = run.samples_expected - run.samples_stored - run.samples_lost;
-  if (run.samples_lost > 0) return { tone: 'caution', text: `${run.samples_lost} lost` };
+  const missed = run.missed_ticks ? `; ${run.missed_ticks} missed by the robot` : '';
+  if (run.samples_lost > 0) return { tone: 'caution', text: `${run.samples_lost} lost${missed}` };
   if (run.state === 'open') return { tone: '', text: 'recording' };
   if (missing > 0) return { tone: 'caution', text: `${missing} missing` };
-  return { tone: '', text: 'complete' };
+  return { tone: '', text: `complete${missed}` };
 }
 
 export const started_text = (run: Run) => date_and_time(run.started_at_us / 1000);

@@ -48,8 +48,16 @@ export function completeness_text(run: Run, certificate: Certificate | null): { 
   if (run.state === 'open') return { tone: '', text: `Recording: ${count(run.samples_stored)} samples so far.` };
   if (!certificate) return { tone: '', text: 'How complete it is, is being counted.' };
   const { samples_expected, samples_lost, samples_missing, lost_by_cause, longest_gap_samples } = certificate;
+  const { missed_ticks, longest_missed_ticks } = certificate;
+  const missed =
+    missed_ticks === null
+      ? ' What the robot missed is being counted.'
+      : missed_ticks > 0
+        ? ` Missed by the robot: ${count(missed_ticks)} ticks, at most ${count(longest_missed_ticks)} in a row.`
+        : '';
   if (samples_lost === 0 && samples_missing === 0) {
-    return { tone: 'good', text: `Recorded, nothing lost: all ${count(samples_expected)} samples.` };
+    const tone = missed === '' ? 'good' : '';
+    return { tone, text: `Recorded, nothing lost: all ${count(samples_expected)} samples.${missed}` };
   }
   const causes = Object.entries(lost_by_cause).map(([cause, lost]) => `${count(lost)} ${cause.replaceAll('_', ' ')}`);
   const parts = [
@@ -57,7 +65,7 @@ export function completeness_text(run: Run, certificate: Certificate | null): { 
     samples_missing > 0 && `${count(samples_missing)} are still missing: the robot may send them yet`,
     longest_gap_samples > 0 && `the longest gap has ${count(longest_gap_samples)}`,
   ].filter(Boolean);
-  return { tone: 'caution', text: `${parts.join('; ')}.` };
+  return { tone: 'caution', text: `${parts.join('; ')}.${missed}` };
 }
 
 function Completeness({ run, certificate }: { run: Run; certificate: Certificate | null }) {
