@@ -1,6 +1,7 @@
 """Talks to a running station: where it listens, its token, and JSON over HTTP or HTTPS. Standard library only."""
 import json
 import pathlib
+import secrets
 import ssl
 import time
 import urllib.error
@@ -49,12 +50,14 @@ class Station:
         self.token = (self.data_dir / "rheonaut.token").read_text().strip()
         self.database = self.data_dir / "station.sqlite"
         self.tls_certificate = endpoints.get("tls_certificate")  # none: plain HTTP
+        self.client = secrets.token_hex(8)  # by which the station knows this object: its signs of life are its own
 
     def request(self, method, path, body=None, timeout_s=20):
         """The raw answer: (status, headers, bytes)."""
         scheme = "https" if self.tls_certificate else "http"
         request = urllib.request.Request(f"{scheme}://{self.endpoints['http']}{path}", method=method)
         request.add_header("Authorization", f"Bearer {self.token}")
+        request.add_header("Rheonaut-Client", self.client)
         if body is not None:
             request.add_header("Content-Type", "application/json")
             request.data = json.dumps(body).encode()

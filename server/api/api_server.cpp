@@ -72,6 +72,9 @@ ApiServer::ApiServer(boost::asio::io_context& loop, runtime::TaskGroup& tasks, r
                  {"/foxglove", foxglove_upgrade(foxglove_)}}},
       server_{tasks, clock, listener_, options.security->http(), guard_, router_, upgrades_} {
   if (options.foxglove) station.add_sink(foxglove_feed_);
+  live_.keep_experiment = [&experiments](storage::ExperimentId id, const station::Client& client, microseconds age) {
+    experiments.keep_alive(id, client, age);
+  };
   add_routes(loop, station, live, recording, analysis, experiments);
 }
 

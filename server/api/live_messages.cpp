@@ -7,6 +7,7 @@
 #include <set>
 
 #include "server/api/bodies/json.hpp"
+#include "server/api/bodies/query_params.hpp"
 #include "server/api/routes/emergency.hpp"
 #include "server/http/http.hpp"
 #include "server/runtime/counted.hpp"
@@ -65,15 +66,42 @@ Result<void> on_emergency_stop(const Members& message, const identity::Caller& c
   return {};
 }
 
-// With the latest stamp it keeps what the page controls.
+// The robots and experiments for which a page gives a sign of life.
+struct Kept {
+  std::vector<station::RobotId> robots;
+  std::vector<std::int64_t> experiments;
+};
+
+Result<Kept> parse_kept(const Members& message) {
+  const json none = json::array();
+  const json& robots = message.has("robots") ? message.object().at("robots") : none;
+  const json& experiments = message.has("experiments") ? message.object().at("experiments") : none;
+  const auto is_id = [](const json& id) { return id.is_string() && id.get_ref<const std::string&>().size() <= 31; };
+  const auto is_number = [](const json& id) { return id.is_number_unsigned() && id.get<std::uint64_t>() <= kMaxRunId; };
+  if (!robots.is_array() || robots.size() > kMaxWatched || !std::ranges::all_of(robots, is_id)) {
+    return fail(ErrorCode::invalid, fmt::format("robots must be at most {} robot ids", kMaxWatched), "malformed");
+  }
+  if (!experiments.is_array() || experiments.size() > kMaxKept || !std::ranges::all_of(experiments, is_number)) {
+    return fail(ErrorCode::invalid, fmt::format("experiments must be at most {} numbers", kMaxKept), "malformed");
+  }
+  return Kept{robots.get<std::vector<station::RobotId>>(), experiments.get<std::vector<std::int64_t>>()};
+}
+
+// With the latest stamp it keeps what the page names.
 Result<void> on_keep_alive(const Members& message, const identity::Caller& caller, LiveParts& parts) {
-  if (auto known = message.only({"type", "stamp_us"}); !known) return known;
+  if (auto known = message.only({"type", "stamp_us", "robots", "experiments"}); !known) return known;
+  const auto kept = parse_kept(message);
+  if (!kept) return std::unexpected{kept.error()};
   if (!message.has("stamp_us")) return {};
   const auto stamp_us = message.integer("stamp_us", {0, INT64_MAX});
   if (!stamp_us) return std::unexpected{stamp_us.error()};
   // SAFETY: who may command no more keeps no control, and nothing moves in their name.
   if (!caller.scopes.allow(identity::Scope::command)) return {};
-  parts.station.keep_control(caller.actor, microseconds{parts.clock.steady_us() - *stamp_us});
+  const station::Client client{caller.actor, caller.client};
+  const microseconds age{parts.clock.steady_us() - *stamp_us};
+  for (const station::RobotId& robot : kept->robots) parts.station.keep_control(client, robot, age);
+  for (const std::int64_t id : kept->experiments) parts.keep_experiment(id, client, age);
+  if (client.id.empty()) parts.station.keep_control(client, std::nullopt, age);
   return {};
 }
 
@@ -95,6 +123,7 @@ Result<void> on_renew_lease(const Members& message, const identity::Caller& call
   request.action = rheonaut_Command_init_zero;
   request.action.which_action = rheonaut_Command_renew_lease_tag;
   request.actor = caller.actor;
+  request.client = caller.client;
   request.peer = caller.peer;
   request.time_to_live = kRenewalTimeToLive - microseconds{age_us};
   spawn(parts, "lease renewal of robot '" + *robot_id + "'", renew(parts, std::move(request)));
@@ -129,10 +158,11 @@ Result<void> on_watch(const Members& message, live::Subscriber& page, LiveParts&
 
 }  // namespace
 
-live::RobotDocument welcome_message(const std::string& actor, const LiveParts& parts) {
+live::RobotDocument welcome_message(const identity::Caller& caller, const LiveParts& parts) {
   json message;
   message["type"] = "welcome";
-  message["actor"] = actor;
+  message["actor"] = caller.actor;
+  if (!caller.client.empty()) message["client"] = caller.client;
   message["version"] = parts.version;
   message["utc_us"] = parts.clock.utc_us();
   message["stamp_us"] = parts.clock.steady_us();

@@ -15,6 +15,7 @@
 #include "server/api/bodies/json.hpp"
 #include "server/api/close_frame.hpp"
 #include "server/api/peer_watch.hpp"
+#include "server/runtime/secrets.hpp"
 
 namespace server::api {
 namespace asio = boost::asio;
@@ -40,12 +41,14 @@ class LivePage {
   }
   ~LivePage() {
     parts_.live.remove(queue_);
+    leave_client();
     if (closing_) write_close_frame(socket_.next_layer(), peer_, *closing_);
   }
   LivePage(const LivePage&) = delete;
   LivePage& operator=(const LivePage&) = delete;
 
   asio::awaitable<void> run(http::UpgradeRequest upgrade) {
+    take_client(http::Target{std::string{upgrade.target()}});
     const auto [error] = co_await socket_.async_accept(upgrade, asio::as_tuple(asio::use_awaitable));
     if (error) co_return;
     closing_.emplace();       // how a task ends that is cancelled
@@ -60,6 +63,30 @@ class LivePage {
   }
 
  private:
+  // The id by which the page goes: the one that it asks for, or a new one while another page has that.
+  // SAFETY: a tab and its copy are two clients.
+  void take_client(const http::Target& target) {
+    std::string page;
+    for (const auto& [name, value] : target.query().value_or(http::Target::Query{})) {
+      if (name == "client" && identity::is_client_id(value)) caller_.client = value;
+      if (name == "page" && identity::is_client_id(value)) page = value;
+    }
+    if (caller_.client.empty()) return;
+    const auto other = parts_.clients.find(client_key());
+    if (other != parts_.clients.end() && (page.empty() || other->second.page != page))
+      caller_.client = runtime::random_secret();
+    OpenClient& open = parts_.clients[client_key()];
+    open.page = std::move(page);
+    ++open.connections;
+    has_client_ = true;
+  }
+  void leave_client() {
+    if (!has_client_) return;
+    const auto open = parts_.clients.find(client_key());
+    if (open != parts_.clients.end() && --open->second.connections == 0) parts_.clients.erase(open);
+  }
+  std::string client_key() const { return caller_.actor + " " + caller_.client; }
+
   // By an exception the page ends: its other parts do not go on without this one.
   asio::awaitable<void> part(asio::awaitable<void> task) {
     return contained(parts_.tasks.exceptions(), parts_.clock, runtime::Ended::live_page, "page of " + caller_.actor,
@@ -113,7 +140,7 @@ class LivePage {
 
   // One message, in as many frames as it has pieces.
   asio::awaitable<boost::system::error_code> write_welcome() {
-    live::RobotDocument welcome = welcome_message(caller_.actor, parts_);
+    live::RobotDocument welcome = welcome_message(caller_, parts_);
     while (!welcome.is_whole()) {
       const std::string piece = co_await welcome.next();
       queue_.forget_states(welcome.after(), welcome.last());
@@ -158,6 +185,7 @@ class LivePage {
 
   websocket::stream<http::HttpStream> socket_;
   identity::Caller caller_;
+  bool has_client_ = false;  // it is counted under its id
   LiveParts& parts_;
   live::Subscriber queue_;
   PeerWatch peer_;

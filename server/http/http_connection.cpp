@@ -260,6 +260,10 @@ void HttpConnection::admit(Request& request, identity::Caller caller) {
   if (!caller.actor.empty()) slot_.becomes(net::ConnectionSlot::busy);
   request.caller = std::move(caller);
   request.caller.peer = address_of(stream_);
+  // SAFETY: what is no id is none; a stop is carried out whatever its client calls itself.
+  if (std::string id = request.header("rheonaut-client"); identity::is_client_id(id)) {
+    request.caller.client = std::move(id);
+  }
   request.actor = request.caller.actor;
   request.peer = request.caller.peer;
 }

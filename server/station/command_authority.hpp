@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "server/station/commands/authority.hpp"
-#include "server/station/commands/presence.hpp"
 #include "server/station/commands/requests.hpp"
 
 namespace server::station {
@@ -18,12 +17,15 @@ const char* text(ControlAction action);
 
 class CommandAuthority {
  public:
-  explicit CommandAuthority(runtime::Clock& clock) : authority_{clock, reservations_}, presence_{clock} {}
+  explicit CommandAuthority(runtime::Clock& clock) : authority_{clock, reservations_} {}
 
   ControlState of(const RobotId& robot) const { return authority_.of(robot); }
   Result<void> may_use(const RobotId& robot, const std::string& actor) const {
     return authority_.may_use(robot, actor);
   }
+
+  bool is_kept_by(const RobotId& robot, const Client& client) const { return authority_.is_kept_by(robot, client); }
+  Client client_of(const RobotId& robot) const { return authority_.client_of(robot); }
 
   const Reservations& reservations() const { return reservations_; }
   Reservations& reservations() { return reservations_; }
@@ -31,6 +33,8 @@ class CommandAuthority {
     return authority_.keeps_out(robot, actor, ahead);
   }
 
+  // Whether the command, once it is sent, brings another client of the holder into control.
+  bool changes_client(const CommandRequest& request) const;
   // conflict when the command needs control of the robot and another has it, or has reserved the robot.
   Result<void> may_command(const CommandRequest& request) const;
   // conflict when what its page saw was too old for what the command would do.
@@ -40,15 +44,13 @@ class CommandAuthority {
 
   // What a request for control changes, if anything.
   Result<std::optional<Authority::Change>> change(const ControlRequest& request);
-  // The actor is still there.
-  void keep(const std::string& actor, microseconds age);
-  std::optional<std::int64_t> seen_us(const std::string& actor) const { return presence_.seen_us(actor); }
+  // The client is still there, for this robot; none: for what it controls, of a client without an id.
+  void keep(const Client& client, const std::optional<RobotId>& robot, microseconds age);
   std::vector<Authority::Change> expire() { return authority_.expire(); }
 
  private:
   Reservations reservations_;
   Authority authority_;
-  Presence presence_;
 };
 
 }  // namespace server::station

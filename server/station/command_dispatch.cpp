@@ -49,9 +49,9 @@ Result<void> check_request(const CommandRequest& request, const protocol::Comman
   return check_command(wire, entry.robot, envelope, entry.orders_ahead(&wire));
 }
 
-void note_timed(TimedOrders& timed, const PendingCommand& pending) {
+void note_timed(TimedOrders& timed, const CommandRequest& request, const PendingCommand& pending) {
   if (!pending.is_timed_order()) return;
-  timed.by = pending.record.actor;
+  timed.by = {request.actor, request.client};
   timed.until_robot_us = std::max(timed.until_robot_us, pending.wire.execute_at_robot_us);
 }
 
@@ -70,7 +70,7 @@ Result<std::shared_ptr<PendingCommand>> dispatch(StationParts& parts, RobotEntry
   if (auto held = parts.control.may_command(request); !held) return std::unexpected{held.error()};
   // SAFETY: timed commands of the former holder of control are dropped from the robot before this command is sent, or
   // it is not sent.
-  const bool is_clear = !needs_control(request.action) || parts.drop_outdated(entry);
+  bool is_clear = !needs_control(request.action) || parts.drop_outdated(entry);
   auto pending = make_pending(parts.loop, parts.clock, request, entry.robot);
   const auto checked = check_request(request, pending->wire, entry, parts.envelope);
   if (!checked) return std::unexpected{checked.error()};
@@ -81,13 +81,16 @@ Result<std::shared_ptr<PendingCommand>> dispatch(StationParts& parts, RobotEntry
   }
   if (auto seen = parts.control.check_sight(request); !seen) return std::unexpected{seen.error()};
   if (auto reached = check_time(*pending, entry.robot); !reached) return std::unexpected{reached.error()};
+  // SAFETY: so are those of another page or program of the same actor, into whose place this command comes.
+  const Client client{request.actor, request.client};
+  if (is_clear && parts.control.changes_client(request)) is_clear = parts.timed.drop_outdated(entry, client);
   if (is_clear) parts.tracker.supersede_queued(entry, *pending);
   if (!is_clear || !entry.link->send(pending->wire, pending->deadline_us)) {
     return fail(ErrorCode::unavailable, fmt::format("too many commands wait for robot '{}'", request.robot_id),
                 "queue_full");
   }
   take_control(parts, request, *pending);
-  note_timed(entry.timed, *pending);
+  note_timed(entry.timed, request, *pending);
   entry.commands.add(pending);
   parts.notifier.publish(pending->record);
   return pending;

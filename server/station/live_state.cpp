@@ -18,7 +18,7 @@ void begin_boot(RobotEntry& entry) {
   entry.orders.clear();
   entry.next_event_seq = 0;
   entry.commands.unknown.clear();  // what the boot before knew of them is gone
-  entry.timed.by.clear();
+  entry.timed.by = {};
   entry.timed.until_robot_us = entry.timed.drop_id = 0;
   entry.timed.is_of_earlier_run = false;
 }

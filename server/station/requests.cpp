@@ -189,14 +189,21 @@ Result<ControlState> Station::control(const ControlRequest& request) {
     return std::unexpected{change.error()};
   }
   if (*change) parts_->publish(**change, request.actor, request.peer);
+  const Client now = parts_->control.client_of(request.robot_id);
+  if (request.with_orders && entry->timed.by.actor == now.actor) entry->timed.by = now;
+  parts_->drop_outdated(*entry);
   return parts_->control.of(request.robot_id);
 }
 
-void Station::keep_control(const std::string& actor, microseconds age) { parts_->control.keep(actor, age); }
-
-std::optional<std::int64_t> Station::seen_us(const std::string& actor) const { return parts_->control.seen_us(actor); }
+void Station::keep_control(const Client& client, const std::optional<RobotId>& robot, microseconds age) {
+  parts_->control.keep(client, robot, age);
+}
 
 std::string Station::holder(const RobotId& id) const { return parts_->control.of(id).holder; }
+
+bool Station::is_kept_by(const RobotId& id, const Client& client) const {
+  return parts_->control.is_kept_by(id, client);
+}
 
 asio::awaitable<void> Station::watch_control() {
   const RecordsAtTheEnd records_at_the_end{*parts_};

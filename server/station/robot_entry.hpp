@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "server/station/commands/client.hpp"
 #include "server/station/commands/order_timeline.hpp"
 #include "server/station/commands/robot_commands.hpp"
 #include "server/station/event_limit.hpp"
@@ -19,9 +20,10 @@ namespace server::station {
 
 inline constexpr std::int64_t kEventPeriodUs = 10'000'000;  // of refusals, and of values that cannot be
 
-// Timed commands that may wait on the robot: whose they are (empty: nobody's), and until when one of them may.
+// Timed commands that may wait on the robot: whose they are (without an actor: nobody's), and until when one of them
+// may.
 struct TimedOrders {
-  std::string by;
+  Client by;
   std::uint64_t until_robot_us = 0;
   const char* drop_because = nullptr;  // why they have to be dropped; null: they need not
   bool has_lost_a_step = false;        // the robot dropped a setpoint of its own accord: another may have built on it

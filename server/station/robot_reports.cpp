@@ -131,7 +131,7 @@ void Station::on_samples(RobotLink& link, Checked<protocol::Telemetry> telemetry
   parts_->tracker.on_samples(*entry, batch);
   // SAFETY: by now every acknowledgement has come of what the robot dropped together; what is left was judged wrongly.
   TimedOrders& timed = entry->timed;
-  const bool waits = !timed.by.empty();
+  const bool waits = !timed.by.actor.empty();
   if (waits && entry->orders.begins_too_far_away(robot, entry->commands, parts_->limits_of(robot))) {
     timed.drop_because = "step_too_large";
   }
@@ -231,7 +231,7 @@ bool Station::is_attended(const RobotLink& link) const {
   const RobotEntry* entry = RobotTable::of(link);
   if (entry == nullptr) return false;
   const RobotState& robot = entry->robot;
-  const bool is_commanded = robot.pending_stop || !robot.control.holder.empty() || !entry->timed.by.empty();
+  const bool is_commanded = robot.pending_stop || !robot.control.holder.empty() || !entry->timed.by.actor.empty();
   return is_commanded || !entry->commands.is_empty() || parts_->notifier.is_watched(robot.id);
 }
 

@@ -112,7 +112,7 @@ Result<void> Station::set_fluid(const RobotId& id, const std::string& text, cons
   // SAFETY: what waits was held to the limits of before, and outlives none that is narrower.
   if (is_narrower) {
     parts_->timed.withdraw_queued(*entry, "limits_changed", [](const PendingCommand&) { return true; });
-    parts_->timed.drop_all(*entry, parts_->control.of(id).holder, "limits_changed");
+    parts_->timed.drop_all(*entry, parts_->control.client_of(id), "limits_changed");
   }
   parts_->notifier.publish_fluid(robot);
   parts_->notifier.publish(AuditNote{by, id, "robot.fluid_set", fluid, fluid_detail(before)});

@@ -20,6 +20,7 @@
 #include "server/config/link_settings.hpp"
 #include "server/runtime/clock.hpp"
 #include "server/runtime/result.hpp"
+#include "server/station/commands/client.hpp"
 #include "server/station/commands/requests.hpp"
 #include "server/station/commands/reservations.hpp"
 #include "server/station/state/audit_note.hpp"
@@ -70,12 +71,12 @@ class Station {
 
   // Changes who holds control of a robot, see Authority.
   Result<ControlState> control(const ControlRequest& request);
-  // A sign of life of an actor: what it controls stays its own. `age`: of what it has seen of the robots.
-  void keep_control(const std::string& actor, microseconds age);
-  // Steady time of what the actor saw with its last fresh sign of life; none: long ago, or never.
-  std::optional<std::int64_t> seen_us(const std::string& actor) const;
-  std::string holder(const RobotId& id) const;   // of control, now; empty: nobody
-  boost::asio::awaitable<void> watch_control();  // reports when control has ended, until cancelled
+  // A sign of life of a client for a robot, whose control stays its own; without a robot for all that it controls,
+  // which is for clients without an id. `age`: of what it has seen of the robots.
+  void keep_control(const Client& client, const std::optional<RobotId>& robot, microseconds age);
+  std::string holder(const RobotId& id) const;                     // of control, now; empty: nobody
+  bool is_kept_by(const RobotId& id, const Client& client) const;  // control; or nobody has it
+  boost::asio::awaitable<void> watch_control();                    // reports when control has ended, until cancelled
 
   // Whether the reservation may be made: what Reservations::check says. conflict, too: somebody is in control of the
   // robot whom it would keep out within kReservationNotice, and no administrator makes it.

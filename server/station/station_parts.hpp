@@ -28,7 +28,7 @@ struct StationParts {
 
   const config::CommandLimits& limits_of(const RobotState& robot) const { return envelope.in(robot.fluid); }
   // SAFETY: timed commands of the former holder of control are dropped before the next command; false: do not send it.
-  bool drop_outdated(RobotEntry& entry) { return timed.drop_outdated(entry, control.of(entry.robot.id).holder); }
+  bool drop_outdated(RobotEntry& entry) { return timed.drop_outdated(entry, control.client_of(entry.robot.id)); }
 
   // A change of control has been decided: what it ends is dropped, and everybody is notified.
   void publish(const Authority::Change& change, const std::string& actor, const std::string& peer);

@@ -27,9 +27,9 @@ bool has_timed_setpoint(const RobotEntry& entry) {
 
 }  // namespace
 
-bool TimedCommands::drop_outdated(RobotEntry& entry, const std::string& holder) {
+bool TimedCommands::drop_outdated(RobotEntry& entry, const Client& holder) {
   withdraw_queued(entry, "control_ended", [&holder](const PendingCommand& pending) {
-    return pending.record.actor != holder && (pending.is_by_holder || !holder.empty());
+    return pending.record.actor != holder.actor && (pending.is_by_holder || !holder.actor.empty());
   });
   choose_reason(entry, holder);
   const bool is_lost = entry.timed.drop_id != 0 && !entry.commands.unanswered.contains(entry.timed.drop_id);
@@ -38,15 +38,15 @@ bool TimedCommands::drop_outdated(RobotEntry& entry, const std::string& holder) 
   return send_drop(entry);
 }
 
-void TimedCommands::drop_all(RobotEntry& entry, const std::string& holder, const char* reason) {
+void TimedCommands::drop_all(RobotEntry& entry, const Client& holder, const char* reason) {
   entry.timed.drop_because = reason;
   drop_outdated(entry, holder);
 }
 
-void TimedCommands::choose_reason(RobotEntry& entry, const std::string& holder) const {
+void TimedCommands::choose_reason(RobotEntry& entry, const Client& holder) const {
   TimedOrders& timed = entry.timed;
   const bool is_ahead = entry.robot.latest_robot_time_us <= timed.until_robot_us + kDueGraceUs;
-  const bool may_wait = timed.is_of_earlier_run || (!timed.by.empty() && is_ahead);
+  const bool may_wait = timed.is_of_earlier_run || (!timed.by.actor.empty() && is_ahead);
   if (!may_wait) timed.drop_because = nullptr;
   const bool has_lost_a_step = std::exchange(timed.has_lost_a_step, false);
   if (may_wait && has_lost_a_step && has_timed_setpoint(entry)) timed.drop_because = "step_before_dropped";
@@ -62,7 +62,7 @@ bool TimedCommands::send_drop(RobotEntry& entry) {
   request.answer_grace = kOwnAnswerGrace;
   const auto drop = make_pending(loop_, clock_, request, entry.robot);
   if (!entry.link->send(drop->wire, drop->deadline_us)) return false;
-  entry.timed.by.clear();
+  entry.timed.by = {};
   entry.timed.until_robot_us = 0;
   entry.timed.is_of_earlier_run = false;
   entry.timed.drop_because = nullptr;

@@ -79,7 +79,7 @@ async function look_at_one_that_runs() {
   await shows('running');
   await until('its progress is shown', async () => /Run 1 of 1, [1-9]\d* of 600 s/.test(await page.locator('#experiment-progress').innerText().catch(() => '')));
   await page.locator('#run-plot .track').waitFor();
-  await says(page, '#presence', /in the name of this page, which must stay open/);
+  await says(page, '#presence', /in the hands of this page, which must stay open/);
   await fits('one that runs');
   if ((await state()) === 'running') return id;
   unfit.length = faults_before;
@@ -177,6 +177,38 @@ const steps = {
     await until('the robot rests', async () => (await robot()).mode === 'manual');
     assert.equal((await experiment(id)).reason, 'requested');
     await until('nothing more can be done with it', async () => (await page.locator('.acts button').count()) === 0);
+  },
+
+  async 'it is in the hands of one tab, over a reload, until another takes it over'() {
+    await paste(profile('in these hands', 120));
+    const id = await start();
+    await shows('running');
+    const client = (await experiment(id)).client;
+    await page.reload();
+    await says(page, '#presence', /It is in the hands of this page/);
+    assert.equal((await experiment(id)).client, client, 'the tab goes by its id over a reload');
+    const other = await page.context().newPage(); // the same session
+    await other.goto(page.url());
+    await says(other, '#presence', /It is in the hands of another page or program of yours/);
+    await page.goto('about:blank');
+    await until('nobody is there for it', async () => ['aborted', 'paused'].includes((await experiment(id)).state));
+    assert.equal((await experiment(id)).reason, 'nobody_present', 'the other tab is another client');
+    await is_at_rest();
+    await other.close();
+    await page.goto(bench.http);
+
+    await paste(profile('into other hands', 120));
+    const taken = await start();
+    await shows('running');
+    const taker = await page.context().newPage();
+    await taker.goto(page.url());
+    await taker.locator('#take-over:enabled').click();
+    await says(taker, '#presence', /It is in the hands of this page/);
+    await says(page, '#presence', /It is in the hands of another page or program of yours/);
+    await taker.locator('#abort-experiment').click();
+    await until('it is over', async () => (await experiment(taken)).state === 'aborted');
+    await taker.close();
+    await is_at_rest();
   },
 
   async 'the stop stops an experiment, from this page as from every other'() {

@@ -33,7 +33,7 @@ async function hold(page, selector, ms) {
 async function make_large(page) {
   const model = await robot();
   const unknown = Array.from({ length: kKnown }, (_, n) => ({ ...model, robot_id: `seen-once-${n}`, link: 'disconnected', mode: 'unspecified', emergency_id: null, control: null }));
-  await page.routeWebSocket('**/live', (socket) => {
+  await page.routeWebSocket(/\/live\?/, (socket) => {
     const station = socket.connectToServer();
     station.onMessage((text) => {
       const message = JSON.parse(text);

@@ -76,7 +76,9 @@ Answered GoldenStation::command(TestRobot& to, const std::string& path, const js
 
 std::string GoldenStation::welcome() {
   std::string text;
-  tasks.spawn("welcome", read_whole(welcome_message("user:ada", parts_), text));
+  identity::Caller ada;
+  ada.actor = "user:ada";
+  tasks.spawn("welcome", read_whole(welcome_message(ada, parts_), text));
   clock.settle();
   return text;
 }

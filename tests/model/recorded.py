@@ -148,6 +148,9 @@ def trace_of(record):
         return Trace([], [], str(reason))
 
 
+ACTOR = r"([^\s,]+)(?:, (?:page|script) \S+)?"  # and its client, where that has an id
+
+
 def of_station(record):
     """The list, of each command in it and of those that the model leaves out its time of control, and why the list ends
     before the record does."""
@@ -159,7 +162,7 @@ def of_station(record):
     moments.sort(key=lambda moment: moment[:2])
     for place in range(len(moments) - 1):  # a command that takes control is submitted, and then control is taken
         (_, kind, command, _), (_, _, event, detail) = moments[place], moments[place + 1]
-        if kind == 2 and event == "control_taken" and detail == f"by {command['actor']}":
+        if kind == 2 and event == "control_taken" and detail.split(", ")[0] == f"by {command['actor']}":
             moments[place], moments[place + 1] = moments[place + 1], moments[place]
     found, tenures, actors, tenure, stops = [], {}, [], 0, 0
 
@@ -190,7 +193,7 @@ def of_station(record):
                 stops += what["kind"] == "emergency_stop"
                 tenures[what["command_id"]] = tenure
             elif what in ("control_taken", "control_forced", "control_handed_over"):
-                taken = re.match(r"by (\S+) from|by (\S+) to (\S+)|by (\S+)", detail)
+                taken = re.match(rf"by {ACTOR} from|by {ACTOR} to {ACTOR}|by {ACTOR}", detail)
                 number = number_of(taken.group(1) or taken.group(3) or taken.group(4))
                 tenure += 1
                 found.append(("CONTROL", number))

@@ -107,7 +107,7 @@ class RecordedTest(unittest.TestCase):
 
     def test_a_fifth_operator(self):
         for name in ("b", "c", "d"):
-            self.robot.station_event("control_forced", f"by {name} from anna: why")
+            self.robot.station_event("control_forced", f"by {name}, page 0123abcd from anna: why")
         self.assertEqual(self.trace().left_out, "")
         self.robot.station_event("control_forced", "by e from d: why")
         self.assertEqual(self.trace().left_out, recorded.OPERATORS)

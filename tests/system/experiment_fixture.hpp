@@ -144,6 +144,8 @@ class ExperimentTest : public SystemTest {
   std::unique_ptr<server::experiments::Experiments> experiments;
 
  private:
+  static constexpr storage::ExperimentId kMostOfATest = 300;
+
   void make(bool allow_unattended) {
     const server::experiments::DriverParts parts{loop, clock, tasks, station};
     experiments = std::make_unique<server::experiments::Experiments>(parts, *recording, maths, allow_unattended);
@@ -168,9 +170,15 @@ class ExperimentTest : public SystemTest {
     co_await experiments->abort(id, "", by);
   }
 
+  // For all that it controls, and all experiments that are in its hands.
+  void give_sign_of_life(const std::string& actor) {
+    station.keep_control({actor, ""}, std::nullopt, 20ms);
+    for (storage::ExperimentId id = 1; id < kMostOfATest; ++id) experiments->keep_alive(id, {actor, ""}, 20ms);
+  }
+
   boost::asio::awaitable<void> stay(std::string actor) {
     for (;;) {
-      if (is_there_[actor]) station.keep_control(actor, 20ms);
+      if (is_there_[actor]) give_sign_of_life(actor);
       co_await clock.sleep_for(100ms);
     }
   }

@@ -1,13 +1,16 @@
 """Experiments of a real station with a simulated robot: one in one command; the queue under kill -9 at random moments."""
+import contextlib
+import json
 import os
 import random
 import re
+import sqlite3
 import subprocess
 import threading
 import time
 import unittest
 
-from processes import BIN, ApiError, lab, wait_until
+from processes import BIN, ApiError, commanded, lab, wait_until
 
 KILLS = int(os.environ.get("RHEONAUT_QUEUE_KILLS", "6"))  # docs/reliability.md has the figures of 50
 ENDED = {"done", "aborted", "cancelled", "interrupted"}
@@ -17,7 +20,7 @@ AUTO = {"name": "auto", "purpose": "moves", "step": [{"kind": "setpoint", "setpo
 
 
 class SignsOfLife:
-    """Of the script, for whichever experiment takes them, until it is closed."""
+    """Of the script, for each experiment that is in its hands, until it is closed."""
 
     def __init__(self, station):
         self.station = station
@@ -27,13 +30,10 @@ class SignsOfLife:
 
     def run(self):
         while not self.ends.wait(0.1):
-            try:
+            with contextlib.suppress(ApiError, OSError):  # it is being killed
                 for one in self.station.get("/api/v1/experiments?limit=20")["experiments"]:
-                    if one["state"] not in ENDED:
-                        self.station.post(f"/api/v1/experiments/{one['experiment_id']}/keep-alive")
-                        break
-            except (ApiError, OSError):
-                pass  # it is being killed, or the experiment has just ended
+                    if one["state"] not in ENDED:  # 409: it has just ended, or is in other hands
+                        self.station.request("POST", f"/api/v1/experiments/{one['experiment_id']}/keep-alive")
 
     def close(self):
         self.ends.set()
@@ -74,6 +74,39 @@ class ExperimentsTest(unittest.TestCase):
             self.assertIn("Two steps", listed.stdout)
             metrics = station.get(f"/api/v1/runs/{run_id}/metrics")
             self.assertAlmostEqual(metrics["steps"][0]["target_m"], 0.1, places=6)
+
+    def test_an_invocation_keeps_alive_what_it_began_and_nothing_else(self):
+        with lab() as place:
+            station = place.start_station()
+            for robot_id in ("sim-1", "sim-2"):
+                place.start_robot(station, robot_id, "--sensor", "perfect")
+            for robot_id in ("sim-1", "sim-2"):
+                station.wait_for_robot(robot_id)
+            profile = place.folder / "duty.json"
+            profile.write_text(json.dumps(DUTY))
+            rest = place.folder / "rest.json"
+            rest.write_text(json.dumps({"name": "rest", "purpose": "nothing moves", "conditions": {"start": "here"},
+                                        "step": [{"kind": "rest", "for_s": 4}]}))
+            begin = lambda *words: place.tool("experiment", "begin", *words, "--data", place.data)
+            commanded(station, "set_mode", "sim-2", mode="manual")  # nothing begins within 3 s of a person's command
+            left = begin(profile, "--robot", "sim-2", "--json")
+            self.assertEqual(left.returncode, 0, left.stderr)
+            left_alone = json.loads(left.stdout)
+            self.assertEqual(left_alone["waits_for"], "robot_in_use")
+            self.performed(lambda: begin(rest, "--robot", "sim-1", "--wait"))
+            waits = station.get(f"/api/v1/experiments/{left_alone['experiment_id']}")
+            self.assertEqual((waits["state"], waits["waits_for"]), ("waiting", "nobody_present"))
+            self.assertIn("token:local, script", waits["waits_for_detail"])
+            refused = station.request("POST", f"/api/v1/experiments/{left_alone['experiment_id']}/keep-alive")
+            self.assertEqual(refused[0], 409)
+            wait_until(lambda: station.robot("sim-2")["sample"]["duty"] == 0, 10, "it is at rest")
+            with sqlite3.connect(f"file:{place.data / 'station.sqlite'}?mode=ro", uri=True) as database:
+                moved = database.execute("SELECT count(*) FROM sample JOIN segment ON row BETWEEN first_row AND last_row"
+                                         " JOIN boot USING (boot_key) WHERE robot_id = 'sim-2' AND duty <> 0").fetchone()
+            self.assertEqual(moved, (0,))
+            done = place.tool("experiment", "take-over", left_alone["experiment_id"], "--wait", "--data", place.data)
+            self.assertIn(done.returncode, (0, 5), done.stderr)  # 5: a machine that stood still
+            self.assertNotEqual(station.get(f"/api/v1/experiments/{left_alone['experiment_id']}")["state"], "waiting")
 
     def test_the_pump_of_the_simulator_is_set_by_a_person_and_stored_with_the_run(self):
         with lab() as place:

@@ -168,7 +168,7 @@ export class EmergencyStop {
 }
 
 // Random, also on a page without TLS, where the browser has no randomUUID.
-function new_key(): string {
+export function new_key(): string {
   const words = crypto.getRandomValues(new Uint32Array(4));
   return Array.from(words, (word) => word.toString(16)).join('-');
 }

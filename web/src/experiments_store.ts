@@ -12,6 +12,14 @@ export type ExperimentState = ExperimentSummary['state'];
 export const kOpenStates: readonly ExperimentState[] = ['running', 'paused', 'aborting', 'waiting'];
 export const has_ended = (experiment: Pick<ExperimentSummary, 'state'>) => !kOpenStates.includes(experiment.state);
 
+// Of a page, or a script, by its actor and its id.
+export const is_in_hands_of = (
+  experiment: Pick<ExperimentSummary, 'acts_for' | 'client'>,
+  actor: string,
+  client: string,
+) => actor !== '' && experiment.acts_for === actor && (experiment.client ?? '') === client;
+
+const kMostKept = 200; // in one sign of life
 const kMostEnded = 200; // that are kept beside those that go on
 
 export class ExperimentsStore {
@@ -74,11 +82,13 @@ export class ExperimentsStore {
     this.keep([moved]);
   }
 
-  // SAFETY: the station lets a robot go on only while the actor in whose name it moves is there. A page says so for what
-  // it has begun or taken over, and for nothing else.
-  needs_sign_of_life(actor: string): boolean {
-    if (actor === '') return false;
-    return [...this.known.peek().values()].some((each) => each.acts_for === actor && !has_ended(each) && !each.held);
+  // SAFETY: the station lets a robot go on only while the page in whose hands its experiment is is there. A page says so
+  // for what it has begun or taken over, and for nothing else, not even of another tab of its session.
+  kept_by(actor: string, client: string): number[] {
+    return [...this.known.peek().values()]
+      .filter((each) => is_in_hands_of(each, actor, client) && !has_ended(each))
+      .map(({ experiment_id }) => experiment_id)
+      .slice(-kMostKept);
   }
 
   private place_of({ experiment_id, place }: ExperimentSummary): number {

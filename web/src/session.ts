@@ -26,6 +26,7 @@ import { StationPath } from './station_path';
 import { StopPath } from './stop_path';
 import { browser_shelf, ViewSettings } from './settings';
 import { kLogLines, kRefresh_ms, Store } from './store';
+import { tab_shelf, TabClient } from './tab_client';
 import { browser_channel, kTell_ms, Tabs } from './tabs';
 import { Vitals } from './vitals';
 
@@ -33,6 +34,7 @@ const kMaxWatchedAtOnce = 8; // in a larger fleet samples come of the robots tha
 const kMaxWatchedInFleet = 16; // and in the view of the fleet, of those that are in sight
 const kLook_ms = 5000; // how often the health of the recording is asked for
 const kKeepAlive_ms = 1000; // what this page controls stays its own for 3 s
+const kNamedAtOnce = 64; // robots in one sign of life
 
 export class Session {
   readonly api = new Api(
@@ -42,6 +44,7 @@ export class Session {
   readonly experiments = new ExperimentsApi((method, path, body) => this.api.ask(method, path, body));
   readonly store = new Store({ page_ms: () => performance.now(), utc_ms: () => this.utc_us() / 1000 });
   readonly settings = new ViewSettings(browser_shelf());
+  readonly tab = new TabClient(tab_shelf());
   readonly station = signal<Station | null>(null);
   readonly fluids = signal<Fluid[] | null>(null); // that a robot may be in; null: the station has no list of them
   readonly me = signal<Me | null>(null);
@@ -68,7 +71,8 @@ export class Session {
   constructor(surroundings: Partial<Surroundings> = {}) {
     this.link = new LiveLink(
       {
-        open_socket: () => new WebSocket(`${location.protocol === 'https:' ? 'wss' : 'ws'}://${location.host}/live`),
+        open_socket: () =>
+          new WebSocket(`${location.protocol === 'https:' ? 'wss' : 'ws'}://${location.host}/live?${this.tab.query()}`),
         now_ms: () => performance.now(),
         set_timer: (callback, delay_ms) => setTimeout(callback, delay_ms),
         clear_timer: (timer) => clearTimeout(timer as number),
@@ -81,12 +85,12 @@ export class Session {
         if (message.type === 'problem') this.hold.lapse(); // the only message that it can be about, but for a stop
         this.store.receive(message);
         if (message.type === 'welcome') {
+          if (message.client) this.tab.keep(message.client);
           this.emergency.again();
           void this.load_log();
         }
         // With each stamp: what this page has set going needs a sign of life within 400 ms.
-        if (message.type === 'stamp' && this.store.experiments.needs_sign_of_life(this.store.actor.peek()))
-          this.keep_alive();
+        if (message.type === 'stamp' && this.kept_experiments().length > 0) this.keep_alive();
       },
       () => this.on_phase(),
     );
@@ -198,7 +202,7 @@ export class Session {
     if (is_refused_in_past(route.peek(), options.method ?? 'GET', path, options.body))
       return Promise.reject(new ApiError('A replay is shown: nothing is sent to robots from here but a stop.', 0));
     if (options.method === 'POST' && path.startsWith('/api/v1/robots/')) this.store.keep_selected();
-    return fetch(path, options);
+    return fetch(path, { ...options, headers: { ...options.headers, 'Rheonaut-Client': this.tab.id } });
   }
 
   // Stops the robot that is looked at; without one, every robot.
@@ -335,11 +339,18 @@ export class Session {
     if (this.link.send({ type: 'watch', robots: watched })) this.store.watch(watched);
   }
 
-  // Keeps the connection, and with a fresh stamp what this page controls.
+  private kept_experiments = () => this.store.experiments.kept_by(this.store.actor.peek(), this.store.client.peek());
+
+  // Keeps the connection, and with a fresh stamp what this page controls and what is in its hands, in whatever view it is.
   private keep_alive(): void {
-    const { link } = this;
-    const fresh = link.stamp_is_fresh() && link.stamp_us !== null;
-    link.send(fresh ? { type: 'keep_alive', stamp_us: link.stamp_us! } : { type: 'keep_alive' });
+    const { link, store } = this;
+    const { stamp_us } = link;
+    if (!link.stamp_is_fresh() || stamp_us === null) return void link.send({ type: 'keep_alive' });
+    const robots = store.controlled();
+    const experiments = this.kept_experiments();
+    link.send({ type: 'keep_alive', stamp_us, robots: robots.slice(0, kNamedAtOnce), experiments });
+    for (let at = kNamedAtOnce; at < robots.length; at += kNamedAtOnce)
+      link.send({ type: 'keep_alive', stamp_us, robots: robots.slice(at, at + kNamedAtOnce) });
   }
 
   private renew_lease(robot_id: string): boolean {

@@ -25,7 +25,8 @@ export interface LogLine {
 
 export class Store {
   readonly robots = signal<Robot[]>([]);
-  readonly actor = signal(''); // this page, as the station calls it
+  readonly actor = signal(''); // who looks at this page, as the station calls them
+  readonly client = signal(''); // and this tab
   utc_minus_steady_us: number | null = null; // of the station's clocks; null before its first message
   readonly selected_id = signal<string | null>(null);
   readonly selected = computed(() => {
@@ -53,11 +54,19 @@ export class Store {
 
   constructor(private readonly clocks: { page_ms(): number; utc_ms(): number }) {}
 
+  // The robots that whoever looks at this page controls.
+  controlled(): string[] {
+    const is_ours = (robot: Robot) => robot.state.peek().control?.holder === this.actor.peek();
+    const ours = this.robots.peek().filter(is_ours);
+    return ours.map(({ robot_id }) => robot_id);
+  }
+
   receive(message: LiveMessage): void {
     switch (message.type) {
       case 'welcome':
         batch(() => {
           this.actor.value = message.actor;
+          this.client.value = message.client ?? '';
           this.take_states(message.robots, false);
           this.utc_minus_steady_us = message.utc_us - message.stamp_us;
         });

@@ -82,18 +82,19 @@ test('where the station reports the place it decides', () => {
 });
 
 // SAFETY: a sign of life lets a robot go on.
-test('signs of life are for what acts in the name of this page, goes on and is not held', () => {
-  const needs = (change: Partial<ExperimentSummary>) => {
+test('signs of life are for what is in the hands of this tab and goes on', () => {
+  const kept = (change: Partial<ExperimentSummary>) => {
     const store = new ExperimentsStore();
-    store.take(experiment(1, change));
-    return store.needs_sign_of_life('session:1');
+    store.take(experiment(1, { client: 'this-tab', ...change }));
+    return store.kept_by('session:1', 'this-tab');
   };
-  expect(needs({ state: 'running' })).toBe(true);
-  expect(needs({ state: 'waiting' })).toBe(true);
-  expect(needs({ state: 'waiting', held: true })).toBe(false);
-  expect(needs({ state: 'done' })).toBe(false);
-  expect(needs({ state: 'running', acts_for: 'session:2' })).toBe(false);
-  expect(new ExperimentsStore().needs_sign_of_life('')).toBe(false);
+  expect(kept({ state: 'running' })).toEqual([1]);
+  expect(kept({ state: 'waiting' })).toEqual([1]);
+  expect(kept({ state: 'waiting', held: true })).toEqual([1]); // its page is there when it is resumed
+  expect(kept({ state: 'done' })).toEqual([]);
+  expect(kept({ state: 'running', acts_for: 'session:2' })).toEqual([]);
+  expect(kept({ state: 'running', client: 'other-tab' })).toEqual([]);
+  expect(new ExperimentsStore().kept_by('', '')).toEqual([]);
 });
 
 test('the page gives a sign of life with each stamp while something acts in its name, and no stamp otherwise', () => {
@@ -111,8 +112,8 @@ test('the page gives a sign of life with each stamp while something acts in its 
   stamp(200);
   stamp(300);
   expect(signs()).toEqual([
-    { type: 'keep_alive', stamp_us: 200 },
-    { type: 'keep_alive', stamp_us: 300 },
+    { type: 'keep_alive', stamp_us: 200, robots: [], experiments: [1] },
+    { type: 'keep_alive', stamp_us: 300, robots: [], experiments: [1] },
   ]);
   socket.say({ type: 'experiment', experiment: experiment(1, { state: 'done' }) });
   stamp(400);

@@ -75,6 +75,7 @@ json summary_json(const experiments::ExperimentView& view) {
   out["notes"] = experiment.request.notes;
   out["owner"] = experiment.owner;
   out["acts_for"] = experiment.acts_for;
+  out["client"] = text_or_null(experiment.client);
   out["runs_planned"] = experiment.runs_planned;
   out["duration_s"] = experiment.duration_s;
   out["created_at_us"] = experiment.created_at_us;

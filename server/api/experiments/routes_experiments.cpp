@@ -27,10 +27,11 @@ Result<storage::ExperimentId> experiment_id_of(const http::Request& request) {
   return fail(ErrorCode::not_found, fmt::format("there is no experiment '{}'", given), "no_such_experiment");
 }
 
-// SAFETY: what a script asks for is a sign of life of it, as old as the request or as what it has seen of the station;
-// a page gives its own by the stamps on /live.
-void note_sign_of_life(const ExperimentRoutes& parts, const http::Request& request, microseconds age = {}) {
-  if (request.caller.session == 0) parts.station.keep_control(request.actor, std::max(request.unread, age));
+// SAFETY: what a script asks for an experiment is a sign of life of it for that experiment, as old as the request or as
+// what it has seen of the station; a page gives its own by the stamps on /live.
+std::optional<std::int64_t> seen_at(const ExperimentRoutes& parts, const http::Request& request) {
+  if (request.caller.session != 0) return std::nullopt;
+  return parts.clock.steady_us() - request.unread.count();
 }
 
 http::Response view_response(int status, const Result<experiments::ExperimentView>& view) {
@@ -47,8 +48,8 @@ http::Answer begin_experiment(ExperimentRoutes parts, http::Request request) {
   auto body = parse_experiment(request.body);
   if (!body) co_return http::problem(body.error());
   if (auto stands = still_stands(request.caller); !stands) co_return http::problem(stands.error());
-  note_sign_of_life(parts, request);
-  const auto begun = co_await parts.experiments.begin(std::move(*body), author_of(request, parts.clock));
+  const auto seen_at_us = seen_at(parts, request);
+  const auto begun = co_await parts.experiments.begin(std::move(*body), author_of(request, parts.clock), seen_at_us);
   http::Response response = view_response(202, begun);
   if (begun) {
     response.headers.emplace_back("Location", fmt::format("/api/v1/experiments/{}", begun->experiment.id));
@@ -116,9 +117,19 @@ http::Answer keep_alive(ExperimentRoutes parts, http::Request request) {
   if (actor != request.actor) {
     co_return http::problem(409, fmt::format("it acts in the name of {}", actor), "acts_for_another");
   }
+  if (view->experiment.client != request.caller.client) {
+    co_return http::problem(
+        409,
+        fmt::format("it is in the hands of another page or program of {}; take it over, or resume it where it is held",
+                    actor),
+        "acts_for_another");
+  }
   // A stamp of the future is of an earlier boot of the machine: as old as can be.
   const bool is_of_this_boot = !*stamp_us || **stamp_us <= now_us;
-  if (is_of_this_boot) note_sign_of_life(parts, request, microseconds{*stamp_us ? now_us - **stamp_us : 0});
+  const microseconds age{*stamp_us ? now_us - **stamp_us : 0};
+  if (is_of_this_boot && request.caller.session == 0) {
+    parts.experiments.keep_alive(*id, {request.actor, request.caller.client}, std::max(request.unread, age));
+  }
   json out = summary_json(*view);
   out["stamp_us"] = now_us;
   co_return http::json_response(200, std::move(out));
@@ -134,8 +145,8 @@ http::Answer pause_experiment(ExperimentRoutes parts, http::Request request) {
 http::Answer resume_experiment(ExperimentRoutes parts, http::Request request) {
   const auto id = experiment_id_of(request);
   if (!id) co_return http::problem(id.error());
-  note_sign_of_life(parts, request);
-  const auto view = co_await parts.experiments.resume(*id, author_of(request, parts.clock));
+  const auto seen_at_us = seen_at(parts, request);
+  const auto view = co_await parts.experiments.resume(*id, author_of(request, parts.clock), seen_at_us);
   co_return view_response(200, view);
 }
 
@@ -151,8 +162,8 @@ http::Answer abort_experiment(ExperimentRoutes parts, http::Request request) {
 http::Answer take_over_experiment(ExperimentRoutes parts, http::Request request) {
   const auto id = experiment_id_of(request);
   if (!id) co_return http::problem(id.error());
-  note_sign_of_life(parts, request);
-  const auto view = co_await parts.experiments.take_over(*id, author_of(request, parts.clock));
+  const auto seen_at_us = seen_at(parts, request);
+  const auto view = co_await parts.experiments.take_over(*id, author_of(request, parts.clock), seen_at_us);
   co_return view_response(200, view);
 }
 

@@ -216,7 +216,7 @@ nlohmann::json losses_json(const std::vector<storage::StoreLoss>& losses);
 
 // Who asks, and now.
 inline station::Author author_of(const http::Request& request, const runtime::Clock& clock) {
-  return {request.actor, request.peer, clock.utc_us()};
+  return {request.actor, request.peer, clock.utc_us(), request.caller.client};
 }
 
 http::Response unknown_robot(const std::string& id);  // 404, whatever was asked of it

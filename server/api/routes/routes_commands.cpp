@@ -188,6 +188,7 @@ station::CommandRequest request_of(const http::Request& request, ParsedCommand& 
   command.action = parsed.action;
   command.arguments = std::move(parsed.arguments);
   command.actor = request.actor;
+  command.client = request.caller.client;
   command.peer = request.peer;
   command.time_to_live = parsed.time_to_live;
   command.key = std::move(key);
@@ -262,6 +263,7 @@ http::Answer change_control(CommandRoutes parts, http::Request request) {
   station::ControlRequest& control_request = parsed->request;
   control_request.robot_id = request.param.at("robot_id");
   control_request.actor = request.actor;
+  control_request.client = request.caller.client;
   control_request.peer = request.peer;
   // SAFETY: nobody but an admin takes control out of another's hands.
   if (control_request.action == station::ControlAction::force && !request.caller.scopes.allow(identity::Scope::admin)) {

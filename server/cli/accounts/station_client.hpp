@@ -15,6 +15,11 @@ namespace server::cli {
 // The body of an answer that is a success. Throws std::runtime_error saying what the station refused.
 nlohmann::json asked(StationAnswer answer);
 
+// By which id the station knows this invocation of a tool: what it begins is kept alive by it alone. Random, unless the
+// tool goes on with what an earlier invocation began.
+const std::string& invocation_id();
+void go_by(std::string id);  // what is no id changes nothing
+
 class StationClient {
  public:
   // Reads endpoints.json and rheonaut.token. Throws std::runtime_error when either is not there.

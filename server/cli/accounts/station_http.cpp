@@ -5,11 +5,29 @@
 
 #include <stdexcept>
 
+#include "server/cli/accounts/station_client.hpp"
 #include "server/config/endpoint.hpp"
+#include "server/identity/caller.hpp"
+#include "server/runtime/secrets.hpp"
 #include "server/tls/tls_certificate.hpp"
 
 namespace server::cli {
 namespace http = boost::beast::http;
+
+namespace {
+
+std::string& id_of_this_invocation() {
+  static std::string id = runtime::random_secret();
+  return id;
+}
+
+}  // namespace
+
+const std::string& invocation_id() { return id_of_this_invocation(); }
+
+void go_by(std::string id) {
+  if (identity::is_client_id(id)) id_of_this_invocation() = std::move(id);
+}
 
 StationAnswer answer_of(http::response<http::string_body> response) {
   StationAnswer answer;
@@ -34,6 +52,7 @@ HttpRequest request_to(const StationPlace& place, const StationRequest& asked, c
   HttpRequest request{http::string_to_verb(asked.method), asked.target, 11};
   request.set(http::field::host, config::text(place.endpoint));
   request.set(http::field::authorization, "Bearer " + token);
+  request.set("Rheonaut-Client", invocation_id());
   request.keep_alive(false);
   if (!asked.body.is_null()) {
     request.set(http::field::content_type, "application/json");

@@ -13,8 +13,8 @@ using HttpRequest = boost::beast::http::request<boost::beast::http::string_body>
 
 inline constexpr std::uint64_t kMaxAnswerBytes = 2'000'000'000;  // of an archive of hours
 
-// With the station's token; null: without a body. The Host is the address that is asked, with its port: the station
-// makes links of it.
+// With the station's token, and the id of this invocation (station_client.hpp); null: without a body. The Host is the
+// address that is asked, with its port: the station makes links of it.
 HttpRequest request_to(const StationPlace& place, const StationRequest& request, const std::string& token);
 
 // Throws nlohmann::json::exception for a body that is not what its header says.

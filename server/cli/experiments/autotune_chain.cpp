@@ -102,7 +102,10 @@ std::optional<json> AutotuneChain::finished_job(const std::string& stage, const 
 std::optional<std::int64_t> AutotuneChain::run_of_experiment(const std::string& stage, const json& profile) {
   auto id = state_.number(stage, "experiment_id");
   json experiment;
-  if (id) experiment = station_.finished_experiment(*id);
+  if (id) {
+    station_.resume_what_was_left(*id);
+    experiment = station_.finished_experiment(*id);
+  }
   if (!id || experiment.at("state") != "done") {
     if (id)
       say(fmt::format("  experiment {} was {}; it is begun again", *id, experiment.at("state").get<std::string>()));

@@ -6,6 +6,7 @@
 #include <fstream>
 #include <stdexcept>
 
+#include "server/cli/accounts/station_client.hpp"
 #include "server/runtime/private_file.hpp"
 
 namespace server::cli {
@@ -40,9 +41,12 @@ AutotuneState::AutotuneState(std::optional<std::filesystem::path> file, const js
   if (file_ && std::filesystem::exists(*file_)) {
     document_ = read_document(*file_);
     refuse_another(*file_, document_.at("request"), request);
+    go_by(document_.value("client", std::string{}));
+    document_["client"] = invocation_id();  // of a file that had none
+    write();
     return;
   }
-  document_ = {{"version", kVersion}, {"request", request}, {"stages", json::object()}};
+  document_ = {{"version", kVersion}, {"client", invocation_id()}, {"request", request}, {"stages", json::object()}};
   write();
 }
 

@@ -1,7 +1,9 @@
 // What autotune has done so far, as a file that the next call goes on from.
 //
-//   {"version": 1, "request": {…}, "stages": {"identification": {"done": true, "experiment_id": 1, "run_id": 3}, …}}
+//   {"version": 1, "client": "…", "request": {…}, "stages": {"identification": {"done": true, "experiment_id": 1,
+//   "run_id": 3}, …}}
 //
+// `client` is the id by which the station knows it: an experiment that the call before began is still its own.
 // `request` names the robot and the experiments; a file of another request is refused. The file is written whole or not
 // at all, after each stage and when something that the station does has begun.
 // Errors: throws std::runtime_error that names the file.

@@ -14,6 +14,7 @@
 #include <limits>
 #include <sstream>
 #include <stdexcept>
+#include <utility>
 
 #include "server/cli/accounts/account_access.hpp"
 #include "server/cli/accounts/station_client.hpp"
@@ -27,6 +28,7 @@ namespace {
 using nlohmann::json;
 
 constexpr int kWatch_ms = 60;  // between two signs of life; each is as old as the one before, and counts for 400 ms
+constexpr int kConflict = 409;
 constexpr const char* kExperiments = "/api/v1/experiments";
 
 CLI::App* offer(CLI::App& command, ExperimentCommand& options, ExperimentCommand::Act act, const char* name,
@@ -122,17 +124,24 @@ class Interrupt {
   bool has_come_ = false;
 };
 
+// The signs of life of this invocation do not count: somebody else's do.
+void say_whose(const StationAnswer& refused) {
+  if (refused.body.value("reason", "") != "acts_for_another") return;
+  fmt::print(stderr, "rheonaut: this command only looks on: {}\n", one_line(refused.body.value("detail", "")));
+}
+
 json watch(const StationClient& station, std::int64_t id) {
   ProgressShown progress;
   Interrupt interrupt;
   const std::string one = fmt::format("{}/{}", kExperiments, id);
-  bool is_interrupted = false;
+  bool is_interrupted = false, was_told = false;
   json seen = json::object();  // SAFETY: a sign of life is as old as what this tool has seen of the station
   for (;;) {
     // A sign of life, answered without the runs. Refused when it has ended, or when somebody has taken it over: then it
     // is theirs.
     const StationAnswer kept = is_interrupted ? StationAnswer{} : station.ask("POST", one + "/keep-alive", seen);
     const bool is_ours = kept.status == 200;
+    if (kept.status == kConflict && !std::exchange(was_told, true)) say_whose(kept);
     if (is_ours) seen["stamp_us"] = kept.body.at("stamp_us");
     json experiment = is_ours ? kept.body : ask_experiments(station, "GET", one);
     progress.show(experiment);
@@ -241,7 +250,8 @@ int show(const ExperimentCommand& options, std::ostream& out) {
   return 0;
 }
 
-constexpr const char* kWaits = "Wait for its end, and be the sign of life that it needs; Ctrl-C aborts it";
+constexpr const char* kWaits =
+    "Wait for its end, and be the sign of life that it needs, unless another page or program has it; Ctrl-C aborts it";
 
 }  // namespace
 

@@ -41,6 +41,13 @@ json StationWork::finished_job(std::int64_t job_id) const {
   }
 }
 
+void StationWork::resume_what_was_left(std::int64_t experiment_id) const {
+  const std::string target = fmt::format("/api/v1/experiments/{}", experiment_id);
+  const json now = get(target);
+  const bool was_left = now.value("held", false) && now.value("reason", json()) == "nobody_present";
+  if (now.at("state") == "waiting" && was_left) post(target + "/resume", json::object());
+}
+
 json StationWork::finished_experiment(std::int64_t experiment_id) const {
   const std::string target = fmt::format("/api/v1/experiments/{}", experiment_id);
   json seen = json::object();  // SAFETY: a sign of life is as old as what this tool has seen of the station

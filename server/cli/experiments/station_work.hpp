@@ -34,6 +34,8 @@ class StationWork {
   // As the station answers it, ended: a job with its result, an experiment with its runs.
   nlohmann::json finished_job(std::int64_t job_id) const;
   nlohmann::json finished_experiment(std::int64_t experiment_id) const;
+  // An experiment that waits and is held since its client was away is resumed; any other is left as it is.
+  void resume_what_was_left(std::int64_t experiment_id) const;
 
  private:
   nlohmann::json checked(const std::string& method, const std::string& target, const nlohmann::json& body) const;

@@ -37,8 +37,12 @@ std::string steps_json(const Profile& profile, std::size_t first_step, const std
 
 }  // namespace
 
-Conduct::Conduct(const ConductParts& parts, storage::Experiment experiment, Profile profile)
-    : parts_{parts}, experiment_{std::move(experiment)}, profile_{std::move(profile)}, changed_{parts.driver.loop} {}
+Conduct::Conduct(const ConductParts& parts, storage::Experiment experiment, Profile profile, const Life& life)
+    : parts_{parts},
+      experiment_{std::move(experiment)},
+      profile_{std::move(profile)},
+      life_{life},
+      changed_{parts.driver.loop} {}
 
 std::string Conduct::peer() const { return fmt::format("experiment:{}", experiment_.id); }
 
@@ -192,13 +196,15 @@ asio::awaitable<std::string> Conduct::predict(const TimeLine& line) {
 
 asio::awaitable<DriveEnd> Conduct::drive(TimeLine line) {
   co_await await_resumption();
+  if (!abort_) take_control();  // it may have come into other hands meanwhile
   check_robot();
   if (abort_) co_return DriveEnd{abort_};
-  DriveRequest request{experiment_.request.robot_id, experiment_.acts_for, peer(), experiment_.request.is_unattended};
+  DriveRequest request{experiment_.request.robot_id, experiment_.acts_for, experiment_.client, peer(),
+                       experiment_.request.is_unattended};
   const station::RobotSettings* settings = parts_.driver.station.settings(request.robot_id);
   const auto limit_s = settings == nullptr ? std::nullopt : settings->parameters.value("auto_limit_s");
   if (limit_s) request.auto_limit = microseconds{static_cast<std::int64_t>(static_cast<double>(*limit_s) * 1e6)};
-  driver_ = std::make_unique<RunDriver>(parts_.driver, std::move(request), profile_.abort, std::move(line));
+  driver_ = std::make_unique<RunDriver>(parts_.driver, std::move(request), life_, profile_.abort, std::move(line));
   DriveEnd end = co_await driver_->run();
   begins_ = driver_->step_begins();
   // SAFETY: a pause that came while the robot was brought to rest holds the next run.
@@ -244,9 +250,10 @@ void Conduct::abort(Abort why) {
   changed_.notify();
 }
 
-void Conduct::set_actor(const std::string& actor) {
-  experiment_.acts_for = actor;
-  if (driver_) driver_->set_actor(actor);
+void Conduct::set_client(const station::Client& client) {
+  experiment_.acts_for = client.actor;
+  experiment_.client = client.id;
+  if (driver_) driver_->set_client(client);
 }
 
 const Abort* Conduct::pause_reason() const {

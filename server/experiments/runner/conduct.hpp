@@ -45,7 +45,8 @@ struct ConductParts {
 
 class Conduct {
  public:
-  Conduct(const ConductParts& parts, storage::Experiment experiment, Profile profile);
+  // `life` is of the experiment, and outlives it.
+  Conduct(const ConductParts& parts, storage::Experiment experiment, Profile profile, const Life& life);
 
   // None: all runs are done. The robot is at rest, in emergency, or of somebody else.
   boost::asio::awaitable<std::optional<Abort>> run();
@@ -55,7 +56,7 @@ class Conduct {
   void pause(Abort why);
   void resume();
   void abort(Abort why);
-  void set_actor(const std::string& actor);
+  void set_client(const station::Client& client);
 
   void on_samples(const station::SampleBatch& batch);
   void on_robot(const station::RobotState& robot);
@@ -111,6 +112,7 @@ class Conduct {
   const ConductParts parts_;
   storage::Experiment experiment_;
   Profile profile_;
+  const Life& life_;
   std::optional<UntilKnown> until_;  // of a profile with it
   Profile of_run_;                   // the present run's part of the profile, from this step on
   std::size_t first_step_ = 1;
@@ -123,6 +125,7 @@ class Conduct {
   std::uint32_t controller_checksum_ = 0;  // of the first run
   std::uint64_t sampled_until_us_ = 0;     // of the latest batch that arrived while no driver is at work, robot time
   bool is_resumed_ = false;
+  bool had_control_ = false;
   std::uint32_t number_ = 0;
   std::vector<storage::ExperimentRun> begun_;
   std::vector<StepBegin> begins_;  // of the last drive

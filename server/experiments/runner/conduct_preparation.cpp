@@ -42,10 +42,7 @@ asio::awaitable<void> Conduct::prepare(Variant variant) {
   if (!abort_) co_await go_to_start();
 }
 
-bool Conduct::is_actor_there() const {
-  const auto seen_us = parts_.driver.station.seen_us(experiment_.acts_for);
-  return seen_us && parts_.driver.clock.steady_us() - *seen_us <= station::kOldestSight.count();
-}
+bool Conduct::is_actor_there() const { return life_.is_fresh(parts_.driver.clock.steady_us()); }
 
 // SAFETY: nothing is prepared, and no control taken, for somebody who is not there; an unattended one goes on alone.
 asio::awaitable<void> Conduct::await_actor() {
@@ -81,11 +78,20 @@ void Conduct::check_robot() {
 // For the actor; an unattended one for as long as the robot may be alone.
 void Conduct::take_control() {
   station::Station& station = parts_.driver.station;
-  if (station.holder(experiment_.request.robot_id) == experiment_.acts_for && !experiment_.request.is_unattended)
-    return;
+  const station::RobotId& robot_id = experiment_.request.robot_id;
+  const std::string holder = station.holder(robot_id);
+  const bool is_its_own =
+      holder == experiment_.acts_for && station.is_kept_by(robot_id, {experiment_.acts_for, experiment_.client});
+  if (is_its_own && !experiment_.request.is_unattended) return;
+  // SAFETY: what another page or program of the actor has taken meanwhile is not taken back.
+  if (!holder.empty() && !is_its_own && std::exchange(had_control_, true)) {
+    return abort({"control_of_another", fmt::format("control is with another page or program of {}", holder)});
+  }
+  had_control_ = true;
   station::ControlRequest request;
-  request.robot_id = experiment_.request.robot_id;
+  request.robot_id = robot_id;
   request.actor = experiment_.acts_for;
+  request.client = experiment_.client;
   request.peer = peer();
   if (experiment_.request.is_unattended) request.lease = station::kLongestControl;
   const auto taken = station.control(request);

@@ -75,7 +75,8 @@ Result<void> Experiments::check_request(const storage::ExperimentRequest& reques
   return fail(ErrorCode::unavailable, fmt::format("{} experiments wait already", kMostQueued), "too_many_experiments");
 }
 
-asio::awaitable<Result<ExperimentView>> Experiments::begin(storage::ExperimentRequest request, station::Author by) {
+asio::awaitable<Result<ExperimentView>> Experiments::begin(storage::ExperimentRequest request, station::Author by,
+                                                           std::optional<std::int64_t> seen_at_us) {
   if (auto allowed = check_request(request); !allowed) co_return std::unexpected{allowed.error()};
   const runtime::Counted one_more{being_added_};
   const station::RobotId robot_id = request.robot_id;
@@ -101,6 +102,7 @@ asio::awaitable<Result<ExperimentView>> Experiments::begin(storage::ExperimentRe
   experiment.request = std::move(request);
   experiment.request.name = entry.profile.name;
   experiment.owner = experiment.acts_for = by.actor;
+  experiment.client = by.client;
   experiment.runs_planned = prepared->runs;
   experiment.duration_s = prepared->duration_s;
   by.at_us = experiment.created_at_us = parts_.clock.utc_us();
@@ -119,6 +121,10 @@ asio::awaitable<Result<ExperimentView>> Experiments::begin(storage::ExperimentRe
   const ExperimentId id = experiment.id;
   Entry& kept = entries_[id];
   kept = std::move(entry);
+  kept.life.since_us = parts_.clock.steady_us();
+  if (seen_at_us) {
+    keep_alive(id, {by.actor, by.client}, microseconds{parts_.clock.steady_us() - *seen_at_us});
+  }
   if (holds_[robot_id].count !=
       holds_before) {  // SAFETY: a stop, or an abort, while it was being stored holds it as well
     kept.experiment.is_held = kept.is_changed = true;
@@ -171,6 +177,49 @@ asio::awaitable<Result<ExperimentView>> Experiments::wait_for_change(ExperimentI
   }
 }
 
+// --- in whose hands one is ---
+
+bool Experiments::keep_alive(ExperimentId id, const station::Client& client, microseconds age) {
+  Entry* entry = entry_of(id);
+  if (entry == nullptr) return false;
+  const Experiment& experiment = entry->experiment;
+  if (client != station::Client{experiment.acts_for, experiment.client}) return false;
+  if (!station::is_fresh(age)) return true;
+  const std::int64_t seen_us = parts_.clock.steady_us() - age.count();
+  entry->life.seen_us = std::max(entry->life.seen_us.value_or(seen_us), seen_us);
+  parts_.station.keep_control(client, experiment.request.robot_id, age);
+  return true;
+}
+
+const Life* Experiments::life_of(ExperimentId id) const {
+  const auto found = entries_.find(id);
+  return found == entries_.end() ? nullptr : &found->second.life;
+}
+
+// Without a sign of life its client has shown itself by what it asked for: it is there, and its signs follow.
+void Experiments::put_into_hands_of(Entry& entry, const station::Client& client,
+                                    std::optional<std::int64_t> seen_at_us) {
+  entry.experiment.acts_for = client.actor;
+  entry.experiment.client = client.id;
+  entry.life.since_us = parts_.clock.steady_us();
+  entry.life.seen_us = seen_at_us.value_or(entry.life.since_us - station::kOldestSight.count() - 1);
+  if (entry.conduct) entry.conduct->set_client(client);
+}
+
+// With what waits on the robot, as far as it is the experiment's.
+Result<void> Experiments::take_control_for(const Entry& entry, const station::Author& by) {
+  const station::RobotId& robot_id = entry.experiment.request.robot_id;
+  const bool is_free = parts_.station.holder(robot_id).empty();
+  if (!entry.conduct || (!is_free && parts_.station.is_kept_by(robot_id, {by.actor, by.client}))) return {};
+  station::ControlRequest request{.robot_id = robot_id, .actor = by.actor, .peer = by.peer, .reason = {}};
+  request.client = by.client;
+  request.with_orders = true;
+  if (entry.experiment.request.is_unattended) request.lease = station::kLongestControl;
+  const auto taken = parts_.station.control(request);
+  if (!taken) return std::unexpected{taken.error()};
+  return {};
+}
+
 // --- what changes one ---
 
 // Null when it has ended, or there never was one.
@@ -197,7 +246,9 @@ station::AuditNote Experiments::note_of(const Entry& entry, const char* what, co
   note.robot_id = entry.experiment.request.robot_id;
   note.action = fmt::format("experiment.{}", what);
   note.subject = fmt::format("{}", entry.experiment.id);
-  note.detail = station::audit_detail({{"name", entry.experiment.request.name}, {"reason", entry.experiment.reason}});
+  nlohmann::json detail{{"name", entry.experiment.request.name}, {"reason", entry.experiment.reason}};
+  if (!by.client.empty()) detail["by"] = text(station::Client{by.actor, by.client});
+  note.detail = station::audit_detail(detail);
   return note;
 }
 
@@ -226,7 +277,8 @@ asio::awaitable<Result<ExperimentView>> Experiments::pause(ExperimentId id, stat
   co_return co_await stored(id, note_of(*entry, "paused", by));
 }
 
-asio::awaitable<Result<ExperimentView>> Experiments::resume(ExperimentId id, station::Author by) {
+asio::awaitable<Result<ExperimentView>> Experiments::resume(ExperimentId id, station::Author by,
+                                                            std::optional<std::int64_t> seen_at_us) {
   by.at_us = parts_.clock.utc_us();
   Entry* entry = entry_of(id);
   if (entry == nullptr) co_return co_await refuse(id, "resumed");
@@ -241,6 +293,12 @@ asio::awaitable<Result<ExperimentView>> Experiments::resume(ExperimentId id, sta
   if (state != ExperimentState::paused && !is_held) co_return wrong_state(view_of(*entry), "resumed");
   experiment.is_held = false;
   experiment.reason.clear();
+  // Into the hands of who resumes it, unless its client is there: a person may resume what their other tool performs.
+  if (entry->life.absent_for_us(parts_.clock.steady_us()) > kAwayFor.count()) {
+    if (auto taken = take_control_for(*entry, by); !taken) co_return std::unexpected{taken.error()};
+    put_into_hands_of(*entry, {by.actor, by.client}, seen_at_us);
+  }
+  entry->life.since_us = parts_.clock.steady_us();
   if (entry->conduct) entry->conduct->resume();
   co_return co_await stored(id, note_of(*entry, "resumed", by));
 }
@@ -275,7 +333,8 @@ asio::awaitable<Result<ExperimentView>> Experiments::abort(ExperimentId id, std:
   co_return co_await find(id);
 }
 
-asio::awaitable<Result<ExperimentView>> Experiments::take_over(ExperimentId id, station::Author by) {
+asio::awaitable<Result<ExperimentView>> Experiments::take_over(ExperimentId id, station::Author by,
+                                                               std::optional<std::int64_t> seen_at_us) {
   by.at_us = parts_.clock.utc_us();
   Entry* found = entry_of(id);
   if (found == nullptr) co_return co_await refuse(id, "taken over");
@@ -297,17 +356,8 @@ asio::awaitable<Result<ExperimentView>> Experiments::take_over(ExperimentId id, 
     co_return fail(ErrorCode::conflict, fmt::format("control of its robot is with {}; take that first", holder),
                    "not_in_control");
   }
-  const bool needs_control = entry.conduct != nullptr && holder.empty();
-  if (needs_control) {
-    station::ControlRequest request;
-    request.robot_id = robot_id;
-    request.actor = by.actor;
-    request.peer = by.peer;
-    const auto taken = parts_.station.control(request);
-    if (!taken) co_return std::unexpected{taken.error()};
-  }
-  entry.experiment.acts_for = by.actor;
-  if (entry.conduct) entry.conduct->set_actor(by.actor);
+  if (auto taken = take_control_for(entry, by); !taken) co_return std::unexpected{taken.error()};
+  put_into_hands_of(entry, {by.actor, by.client}, seen_at_us);
   co_return co_await stored(id, note_of(entry, "taken_over", by));
 }
 

@@ -56,6 +56,7 @@ asio::awaitable<void> Experiments::run() {
   for (;;) {
     put_interrupted_to_rest();
     for (const auto& [robot, id] : running_) abort_if_reserved(robot);
+    hold_what_is_left_alone();
     begin_what_may();
     note_states();
     const std::int64_t now_us = parts_.clock.steady_us();
@@ -113,10 +114,11 @@ Experiments::WaitReason Experiments::wait_reason_of(const Entry& entry) const {
   if (commanded != commanded_at_us_.end() && parts_.clock.steady_us() - commanded->second < kUnusedFor.count()) {
     return {"robot_in_use", "somebody has just commanded the robot"};
   }
-  const auto seen_us = parts_.station.seen_us(experiment.acts_for);
-  const bool is_there = seen_us && parts_.clock.steady_us() - *seen_us <= station::kOldestSight.count();
-  // SAFETY: somebody is there when it begins, also for an unattended one.
-  if (!is_there) return {"nobody_present", experiment.acts_for + " gives no sign of life"};
+  // SAFETY: its own client is there when it begins, also for an unattended one.
+  if (!entry.life.is_fresh(parts_.clock.steady_us())) {
+    return {"nobody_present",
+            text(station::Client{experiment.acts_for, experiment.client}) + " gives no sign of life for it"};
+  }
   const std::vector<std::string>& fluids = entry.profile.sweep.fluids;
   const std::string fluid = fluids.empty() ? entry.profile.conditions.fluid : fluids.front();
   if (!fluid.empty() && !robot->fluid.empty() && fluid != robot->fluid) {
@@ -138,6 +140,20 @@ Experiments::WaitReason Experiments::reserved_for_another(const Experiment& expe
   }
   return {"reserved_soon", fmt::format("the robot is reserved for {} from {} until {}, and it lasts {:.0f} s",
                                        slot->holder, from, until, experiment.duration_s)};
+}
+
+// SAFETY: what nobody waits for any more begins for nobody who comes by.
+void Experiments::hold_what_is_left_alone() {
+  const std::int64_t now_us = parts_.clock.steady_us();
+  for (auto& [id, entry] : entries_) {
+    Experiment& experiment = entry.experiment;
+    const auto running = running_.find(experiment.request.robot_id);
+    const bool is_about_to_begin = running != running_.end() && running->second == id;
+    const bool waits = experiment.state == ExperimentState::waiting && !entry.conduct && !is_about_to_begin;
+    if (!waits || experiment.is_held || entry.life.absent_for_us(now_us) <= kHeldAfter.count()) continue;
+    experiment.is_held = entry.is_changed = true;
+    experiment.reason = "nobody_present";
+  }
 }
 
 void Experiments::begin_what_may() {
@@ -182,7 +198,7 @@ asio::awaitable<void> Experiments::carry_out(ExperimentId id) {
   entry.experiment.started_at_us = parts_.clock.utc_us();
   entry.experiment.state = ExperimentState::running;
   entry.experiment.reason.clear();
-  entry.conduct = std::make_unique<Conduct>(conduct_parts, entry.experiment, entry.profile);
+  entry.conduct = std::make_unique<Conduct>(conduct_parts, entry.experiment, entry.profile, entry.life);
   const std::string name = fmt::format("experiment {}", id);
   co_await runtime::contained(parts_.tasks.exceptions(), parts_.clock, runtime::Ended::experiment, name,
                               conduct(entry));
@@ -215,7 +231,8 @@ asio::awaitable<void> Experiments::finish(Entry& entry) {
   experiment.ended_at_us = parts_.clock.utc_us();
   const station::Author by{experiment.acts_for, fmt::format("experiment:{}", experiment.id), *experiment.ended_at_us};
   // Its control was taken for longer than a sign of life lasts; who commands the robot by now keeps it.
-  if (experiment.request.is_unattended && experiment.reason != "operator_command") {
+  const bool is_kept = parts_.station.is_kept_by(experiment.request.robot_id, {experiment.acts_for, experiment.client});
+  if (experiment.request.is_unattended && experiment.reason != "operator_command" && is_kept) {
     station::ControlRequest release;
     release.robot_id = experiment.request.robot_id;
     release.actor = experiment.acts_for;

@@ -3,9 +3,10 @@
 //   begin() → waiting → running ⇄ paused → done or aborted          every state is a row on disk; cancel() ends a
 //   waiting one
 //
-// SAFETY: nothing begins by itself. An experiment begins when the actor in whose name it acts is there (a page by its
-// stamps, a script by keep_alive()) and nobody else controls the robot, or has reserved it for that time; after an
-// abort or a restart of the station what waits is held until somebody releases it. At most kMostQueued wait. Abort, and
+// SAFETY: nothing begins by itself. An experiment begins when the client in whose hands it is (the page or the script
+// that began it, or took it over) says keep_alive() for this experiment, and nobody else controls the robot, or has
+// reserved it for that time. What waits is held until somebody resumes it: after an abort, after a restart of the
+// station, and when its client has been away for kHeldAfter. At most kMostQueued wait. Abort, and
 // what ends one, leaves the robot at rest. Loop thread; what it is given outlives it.
 #pragma once
 
@@ -25,6 +26,8 @@ namespace server::experiments {
 
 inline constexpr std::size_t kMostQueued = 200;
 inline constexpr std::size_t kMaxProfileBytes = 32'000;
+inline constexpr microseconds kHeldAfter{60'000'000};
+inline constexpr microseconds kAwayFor{10'000'000};
 
 struct ExperimentProgress {
   std::uint32_t run = 0, runs = 0;       // from 1
@@ -57,7 +60,15 @@ class Experiments final : public station::StationSink {
 
   // At the end of the robot's queue, on disk. invalid: what the profile or the station's limits say against it;
   // forbidden: unattended where the configuration does not allow it; not_found; unavailable: too many wait.
-  boost::asio::awaitable<Result<ExperimentView>> begin(storage::ExperimentRequest request, station::Author by);
+  // `seen_at_us`, as below: steady time of what the sender saw, for which the request is a sign of life; none: it is
+  // none. SAFETY: however long it takes until the disk has it, the sign is as old as the request.
+  boost::asio::awaitable<Result<ExperimentView>> begin(storage::ExperimentRequest request, station::Author by,
+                                                       std::optional<std::int64_t> seen_at_us = {});
+
+  // A sign of life for one experiment, and for control of its robot. `age`: of what the client saw of the robots.
+  // SAFETY: of another client than the one in whose hands the experiment is it is none. False then.
+  bool keep_alive(storage::ExperimentId id, const station::Client& client, microseconds age);
+  const Life* life_of(storage::ExperimentId id) const;  // null: it is not known, or has ended
 
   boost::asio::awaitable<Result<ExperimentView>> find(storage::ExperimentId id);
   boost::asio::awaitable<std::vector<ExperimentView>> list(storage::ExperimentFilter filter);  // summaries
@@ -67,11 +78,14 @@ class Experiments final : public station::StationSink {
 
   // By people. not_found; conflict: its state forbids it. Each is in the audit.
   boost::asio::awaitable<Result<ExperimentView>> pause(storage::ExperimentId id, station::Author by);
-  boost::asio::awaitable<Result<ExperimentView>> resume(storage::ExperimentId id, station::Author by);
+  // It comes into the hands of the caller's client if its own has been away for kAwayFor.
+  boost::asio::awaitable<Result<ExperimentView>> resume(storage::ExperimentId id, station::Author by,
+                                                        std::optional<std::int64_t> seen_at_us = {});
   boost::asio::awaitable<Result<ExperimentView>> abort(storage::ExperimentId id, std::string reason,
                                                        station::Author by);
-  // It acts in the caller's name from now on. conflict while somebody else controls the robot.
-  boost::asio::awaitable<Result<ExperimentView>> take_over(storage::ExperimentId id, station::Author by);
+  // It is in the hands of the caller's client from now on. conflict while somebody else controls the robot.
+  boost::asio::awaitable<Result<ExperimentView>> take_over(storage::ExperimentId id, station::Author by,
+                                                           std::optional<std::int64_t> seen_at_us = {});
   // Before another one of its robot's queue (0: to its end), with this priority.
   boost::asio::awaitable<Result<ExperimentView>> move(storage::ExperimentId id, storage::ExperimentId before,
                                                       std::int64_t priority, station::Author by);
@@ -89,6 +103,7 @@ class Experiments final : public station::StationSink {
   struct Entry {
     storage::Experiment experiment;
     Profile profile;
+    Life life;
     std::string waits_for, waits_for_detail;
     std::unique_ptr<Conduct> conduct;  // null: it waits
     std::optional<Abort> end;          // of a conduct that has ended
@@ -131,6 +146,9 @@ class Experiments final : public station::StationSink {
   void note_states();
   void spawn(const std::string& name, boost::asio::awaitable<void> task);
   void begin_what_may();
+  void hold_what_is_left_alone();
+  void put_into_hands_of(Entry& entry, const station::Client& client, std::optional<std::int64_t> seen_at_us);
+  Result<void> take_control_for(const Entry& entry, const station::Author& by);
   void put_interrupted_to_rest();
   WaitReason wait_reason_of(const Entry& entry) const;
   WaitReason reserved_for_another(const storage::Experiment& experiment) const;  // empty: it is not, or not that soon

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <array>
-#include <limits>
 #include <string_view>
 #include <utility>
 
@@ -31,9 +30,11 @@ constexpr std::array<std::string_view, 8> kDisturbing{"set_mode",          "set_
 
 }  // namespace
 
-RunDriver::RunDriver(const DriverParts& parts, DriveRequest request, const AbortCriteria& criteria, TimeLine line)
+RunDriver::RunDriver(const DriverParts& parts, DriveRequest request, const Life& life, const AbortCriteria& criteria,
+                     TimeLine line)
     : parts_{parts},
       request_{std::move(request)},
+      life_{life},
       line_{std::move(line)},
       watch_{criteria, parts.clock.steady_us()},
       feed_{line_, 0, 0},
@@ -42,13 +43,6 @@ RunDriver::RunDriver(const DriverParts& parts, DriveRequest request, const Abort
 std::uint64_t RunDriver::robot_now_us(const station::RobotState& robot) const {
   return static_cast<std::uint64_t>(station::robot_now_us(robot, parts_.clock));
 }
-
-std::int64_t RunDriver::silent_for_us() const {
-  const auto seen_us = parts_.station.seen_us(request_.actor);
-  return seen_us ? parts_.clock.steady_us() - *seen_us : std::numeric_limits<std::int64_t>::max();
-}
-
-bool RunDriver::is_fresh() const { return silent_for_us() <= station::kOldestSight.count(); }
 
 void RunDriver::begin_at(std::size_t step) {
   const station::RobotState* robot = parts_.station.find(request_.robot_id);
@@ -123,10 +117,11 @@ void RunDriver::watch_mode(const station::RobotState& robot) {
 
 // SAFETY: nobody's motor runs while they are away, and nobody's but that of who is in control.
 void RunDriver::watch_actor(const station::RobotState& robot) {
-  const std::int64_t silent_us = silent_for_us(), now_us = parts_.clock.steady_us();
+  const std::int64_t now_us = parts_.clock.steady_us(), silent_us = life_.silent_for_us(now_us);
   const std::string holder = parts_.station.holder(request_.robot_id);
-  if (!holder.empty() && holder != request_.actor) {
-    return pause_for({{"control_changed", fmt::format("control is with {} now", holder)}, now_us});
+  if (!is_in_control() && !holder.empty()) {
+    const char* whose = holder == request_.actor ? "another page or program of " : "";
+    return pause_for({{"control_changed", fmt::format("control is with {}{} now", whose, holder)}, now_us});
   }
   if (request_.is_unattended) {
     if (silent_us <= request_.auto_limit.count() && !holder.empty()) return;
@@ -210,6 +205,7 @@ station::CommandRequest RunDriver::request_of(const protocol::Command& command) 
   request.robot_id = request_.robot_id;
   request.action = command;
   request.actor = request_.actor;
+  request.client = request_.client;
   request.peer = request_.peer;
   request.answer_grace = station::kOwnAnswerGrace;
   request.takes_control = false;  // SAFETY: a program is no sign of life of its operator
@@ -236,7 +232,7 @@ asio::awaitable<void> RunDriver::send(FedCommand fed, std::uint64_t robot_now_us
 
 void RunDriver::renew_lease() {
   const station::RobotState& robot = *parts_.station.find(request_.robot_id);
-  const std::int64_t now_us = parts_.clock.steady_us(), silent_us = silent_for_us();
+  const std::int64_t now_us = parts_.clock.steady_us(), silent_us = life_.silent_for_us(now_us);
   // SAFETY: only by a fresh sign of life of the actor, and for no longer than that is worth.
   if (request_.is_unattended || !is_fresh() || !feed_.needs_lease(robot_now_us(robot))) return;
   if (is_renewing_ || now_us - renewed_at_us_ < kRenewsEvery.count()) return;
@@ -323,8 +319,12 @@ bool RunDriver::is_over_pause(const station::RobotState& robot) {
   check_pause_limit();
   if (abort_) return true;
   const bool may_go_on = pause_->ends_by_itself || pause_->is_resumed;
-  const bool is_in_control = parts_.station.holder(request_.robot_id) == request_.actor;
-  return may_go_on && is_in_control && (is_fresh() || request_.is_unattended);
+  return may_go_on && is_in_control() && (is_fresh() || request_.is_unattended);
+}
+
+bool RunDriver::is_in_control() const {
+  return parts_.station.holder(request_.robot_id) == request_.actor &&
+         parts_.station.is_kept_by(request_.robot_id, {request_.actor, request_.client});
 }
 
 asio::awaitable<Rest> RunDriver::rest() {

@@ -2,10 +2,10 @@
 //
 //   run() → starting → running ⇄ paused → at rest, and the way it ended
 //
-// SAFETY: it acts in the name of an actor, and is no sign of life itself. A duty in manual is renewed only while that
-// actor gives fresh ones; without them the robot is brought to rest, and the step is repeated when the actor is back
-// within kAbsence, or the run ends. Whatever ends a run, the robot is at rest, or in emergency, or somebody else's,
-// when run() returns.
+// SAFETY: it acts in the name of an actor, and is no sign of life itself. A duty in manual is renewed only while the
+// client in whose hands the experiment is gives fresh ones for it; without them the robot is brought to rest, and the
+// step is repeated when the client is back within kAbsence, or the run ends. Whatever ends a run, the robot is at rest,
+// or in emergency, or somebody else's, when run() returns.
 //
 // The owner passes the station's reports on. Loop thread; what it is given outlives it, and so does it its own tasks:
 // run() has returned, or the loop has ended.
@@ -20,6 +20,7 @@
 
 #include "server/experiments/runner/abort_watch.hpp"
 #include "server/experiments/runner/command_feed.hpp"
+#include "server/experiments/runner/life.hpp"
 #include "server/experiments/runner/robot_rest.hpp"
 #include "server/runtime/tasks.hpp"
 #include "server/station/station.hpp"
@@ -42,6 +43,7 @@ struct DriverParts {
 struct DriveRequest {
   station::RobotId robot_id;
   std::string actor;                     // in whose name it commands
+  std::string client;                    // and by which client's id
   std::string peer;                      // "experiment:7", by which its own commands are known
   bool is_unattended = false;            // SAFETY: of a line in auto alone
   microseconds auto_limit{600'000'000};  // longest time without a sign of life, if unattended
@@ -64,7 +66,8 @@ std::optional<Abort> disturbance_of(const station::CommandRecord& record, const 
 class RunDriver {
  public:
   // The robot is at rest, and the actor controls it.
-  RunDriver(const DriverParts& parts, DriveRequest request, const AbortCriteria& criteria, TimeLine line);
+  RunDriver(const DriverParts& parts, DriveRequest request, const Life& life, const AbortCriteria& criteria,
+            TimeLine line);
 
   boost::asio::awaitable<DriveEnd> run();  // returns when no task of its own is left
 
@@ -72,7 +75,10 @@ class RunDriver {
   void pause(std::string reason, std::string detail);  // until resume(); kLongestPause at most
   void resume();
   void abort(Abort why);
-  void set_actor(std::string actor) { request_.actor = std::move(actor); }
+  void set_client(const station::Client& client) {
+    request_.actor = client.actor;
+    request_.client = client.id;
+  }
 
   // --- the station's reports, of this robot alone ---
   void on_samples(const station::SampleBatch& batch);
@@ -116,12 +122,13 @@ class RunDriver {
   void pause_for(Pause pause);
   bool is_over_pause(const station::RobotState& robot);
   void check_pause_limit();
-  bool is_fresh() const;               // the actor's last sign of life
-  std::int64_t silent_for_us() const;  // since the actor's last sign of life
+  bool is_in_control() const;  // its client
+  bool is_fresh() const { return life_.is_fresh(parts_.clock.steady_us()); }
   std::uint64_t robot_now_us(const station::RobotState& robot) const;
 
   const DriverParts parts_;
   DriveRequest request_;
+  const Life& life_;  // of the experiment
   TimeLine line_;
   AbortWatch watch_;
   CommandFeed feed_;

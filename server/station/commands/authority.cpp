@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <utility>
 
 namespace server::station {
 namespace {
@@ -21,7 +22,7 @@ ControlState Authority::of(const RobotId& robot) const {
   if (found == leases_.end() || !is_live(robot, found->second)) return {};
   const Lease& lease = found->second;
   const bool is_requested = lease.request_ends_us > clock_.steady_us();
-  return {lease.holder, lease.taken_at_us, is_requested ? lease.requested_by : std::string{}};
+  return {lease.holder, lease.taken_at_us, is_requested ? lease.requested_by.actor : std::string{}};
 }
 
 // SAFETY: a lease ends with the slot of somebody else, at once, and however often it is renewed.
@@ -55,9 +56,9 @@ Authority::Lease* Authority::lease_of(const RobotId& robot) {
   return found == leases_.end() || !is_live(robot, found->second) ? nullptr : &found->second;
 }
 
-Authority::Lease& Authority::give(const RobotId& robot, const std::string& actor, microseconds duration) {
+Authority::Lease& Authority::give(const RobotId& robot, const Client& client, microseconds duration) {
   Lease& lease = leases_[robot];
-  lease = Lease{actor, clock_.utc_us(), clock_.steady_us() + duration.count(), duration, "", 0};
+  lease = Lease{client.actor, client.id, clock_.utc_us(), clock_.steady_us() + duration.count(), duration, {}, 0};
   return lease;
 }
 
@@ -77,34 +78,37 @@ Result<void> Authority::may_use(const RobotId& robot, const std::string& actor) 
   return held_by(robot, now.holder);
 }
 
-Result<std::optional<Authority::Change>> Authority::use(const RobotId& robot, const std::string& actor) {
+Result<std::optional<Authority::Change>> Authority::use(const RobotId& robot, const Client& client) {
   Lease* lease = lease_of(robot);
-  if (lease == nullptr || lease->holder != actor) return take(robot, actor, kControlLease);
+  if (lease == nullptr || lease->holder != client.actor) return take(robot, client, kControlLease);
+  lease->client = client.id;
   lease->ends_us = std::max(lease->ends_us, clock_.steady_us() + kControlLease.count());
   return std::nullopt;
 }
 
-Result<std::optional<Authority::Change>> Authority::take(const RobotId& robot, const std::string& actor,
+Result<std::optional<Authority::Change>> Authority::take(const RobotId& robot, const Client& client,
                                                          microseconds duration) {
   // SAFETY: nobody commands in the slot of somebody else.
-  if (auto checked = check_reserved(robot, actor); !checked) return std::unexpected{checked.error()};
+  if (auto checked = check_reserved(robot, client.actor); !checked) return std::unexpected{checked.error()};
   Lease* lease = lease_of(robot);
   // SAFETY: control is never shared, and never changes hands behind its holder's back.
-  if (lease != nullptr && lease->holder != actor) return held_by(robot, lease->holder);
+  if (lease != nullptr && lease->holder != client.actor) return held_by(robot, lease->holder);
   if (lease != nullptr) {
+    const bool is_other = std::exchange(lease->client, client.id) != client.id;
     lease->duration = duration;
     lease->ends_us = clock_.steady_us() + duration.count();
+    if (is_other) return Change{robot, "control_taken", "by " + text(client)};
     return std::nullopt;
   }
-  give(robot, actor, duration);
-  return Change{robot, "control_taken", "by " + actor};
+  give(robot, client, duration);
+  return Change{robot, "control_taken", "by " + text(client)};
 }
 
-Authority::Change Authority::take_by_force(const RobotId& robot, const std::string& actor, const std::string& reason) {
+Authority::Change Authority::take_by_force(const RobotId& robot, const Client& client, const std::string& reason) {
   const Lease* lease = lease_of(robot);
   const std::string from = lease == nullptr ? "nobody" : lease->holder;
-  give(robot, actor, kControlLease).is_forced = true;
-  return {robot, "control_forced", fmt::format("by {} from {}: {}", actor, from, reason)};
+  give(robot, client, kControlLease).is_forced = true;
+  return {robot, "control_forced", fmt::format("by {} from {}: {}", text(client), from, reason)};
 }
 
 Result<Authority::Change> Authority::release(const RobotId& robot, const std::string& actor) {
@@ -114,16 +118,16 @@ Result<Authority::Change> Authority::release(const RobotId& robot, const std::st
   return Change{robot, "control_released", "by " + actor};
 }
 
-Result<Authority::Change> Authority::request(const RobotId& robot, const std::string& actor) {
-  if (auto checked = check_reserved(robot, actor); !checked) return std::unexpected{checked.error()};
+Result<Authority::Change> Authority::request(const RobotId& robot, const Client& client) {
+  if (auto checked = check_reserved(robot, client.actor); !checked) return std::unexpected{checked.error()};
   Lease* lease = lease_of(robot);
   if (lease == nullptr) {
     return fail(ErrorCode::conflict, fmt::format("nobody controls robot '{}'; take control", robot), "control_is_free");
   }
-  if (lease->holder == actor) return fail(ErrorCode::conflict, "you are in control already", "in_control");
-  lease->requested_by = actor;
+  if (lease->holder == client.actor) return fail(ErrorCode::conflict, "you are in control already", "in_control");
+  lease->requested_by = client;
   lease->request_ends_us = clock_.steady_us() + kRequestTimeout.count();
-  return Change{robot, "control_requested", fmt::format("by {} from {}", actor, lease->holder)};
+  return Change{robot, "control_requested", fmt::format("by {} from {}", client.actor, lease->holder)};
 }
 
 Result<Authority::Change> Authority::hand_over(const RobotId& robot, const std::string& actor) {
@@ -132,20 +136,36 @@ Result<Authority::Change> Authority::hand_over(const RobotId& robot, const std::
   if ((*lease)->request_ends_us <= clock_.steady_us()) {
     return fail(ErrorCode::conflict, fmt::format("nobody has asked for control of robot '{}'", robot), "not_requested");
   }
-  const std::string to = (*lease)->requested_by;
+  const Client to = (*lease)->requested_by;
   // SAFETY: a slot that keeps them out may have begun since they asked.
-  if (auto checked = check_reserved(robot, to); !checked) return std::unexpected{checked.error()};
+  if (auto checked = check_reserved(robot, to.actor); !checked) return std::unexpected{checked.error()};
   give(robot, to, kControlLease);
-  return Change{robot, "control_handed_over", fmt::format("by {} to {}", actor, to)};
+  return Change{robot, "control_handed_over", fmt::format("by {} to {}", actor, text(to))};
 }
 
-void Authority::keep_alive(const std::string& actor) {
-  const std::int64_t now_us = clock_.steady_us();
-  for (auto& [robot, lease] : leases_) {
-    // SAFETY: what has ended stays ended.
-    const bool is_own = lease.holder == actor && is_live(robot, lease);
-    if (is_own) lease.ends_us = std::max(lease.ends_us, now_us + lease.duration.count());
-  }
+Client Authority::client_of(const RobotId& robot) const {
+  const auto found = leases_.find(robot);
+  if (found == leases_.end() || !is_live(robot, found->second)) return {};
+  return {found->second.holder, found->second.client};
+}
+
+bool Authority::is_kept_by(const RobotId& robot, const Client& client) const {
+  const Client now = client_of(robot);
+  return now.actor.empty() || now == client;
+}
+
+// SAFETY: what has ended stays ended; and another client of the same actor, in whatever tab or program, keeps nothing.
+void Authority::extend(const RobotId& robot, Lease& lease, const Client& client) const {
+  if (Client{lease.holder, lease.client} != client || !is_live(robot, lease)) return;
+  lease.ends_us = std::max(lease.ends_us, clock_.steady_us() + lease.duration.count());
+}
+
+void Authority::keep_alive(const RobotId& robot, const Client& client) {
+  if (const auto found = leases_.find(robot); found != leases_.end()) extend(robot, found->second, client);
+}
+
+void Authority::keep_all_alive(const Client& client) {
+  for (auto& [robot, lease] : leases_) extend(robot, lease, client);
 }
 
 std::vector<Authority::Change> Authority::expire() {

@@ -1,9 +1,9 @@
-// Who may command which robot: control is a lease that one actor holds and keeps renewing.
+// Who may command which robot: control is a lease that one actor holds, and that one client of it keeps alive.
 //
 // An actor is a session of a page ("session:3") or a token ("token:local"). An actor that commands a robot without a
-// holder becomes its holder. While a reservation keeps an actor out they neither get nor have control, unless an
-// administrator took it by force. An emergency stop is never checked here. Loop thread; only keeps the leases: the
-// station reports changes.
+// holder becomes its holder; the client that commanded last, or took control, is the one whose signs of life count.
+// While a reservation keeps an actor out they neither get nor have control, unless an administrator took it by force.
+// An emergency stop is never checked here. Loop thread; only keeps the leases: the station reports changes.
 #pragma once
 
 #include <cstdint>
@@ -14,6 +14,7 @@
 
 #include "server/runtime/clock.hpp"
 #include "server/runtime/result.hpp"
+#include "server/station/commands/client.hpp"
 #include "server/station/commands/requests.hpp"
 #include "server/station/commands/reservations.hpp"
 #include "server/station/state/station_state.hpp"
@@ -41,17 +42,17 @@ class Authority {
   // (reason "reserved"). So do all below but force and release.
   Result<void> may_use(const RobotId& robot, const std::string& actor) const;
 
-  // For a command of the actor: control is its own afterwards, at least for kControlLease. conflict when another holds
+  // For a command of the client: control is its own afterwards, at least for kControlLease. conflict when another holds
   // it.
-  Result<std::optional<Change>> use(const RobotId& robot, const std::string& actor);
+  Result<std::optional<Change>> use(const RobotId& robot, const Client& client);
 
   // `duration`: how long the lease lasts without a keep_alive(). A page calls that several times a second.
-  Result<std::optional<Change>> take(const RobotId& robot, const std::string& actor, microseconds duration);
+  Result<std::optional<Change>> take(const RobotId& robot, const Client& client, microseconds duration);
   // From its present holder. The API lets only an admin do this; the reason is kept.
-  Change take_by_force(const RobotId& robot, const std::string& actor, const std::string& reason);
+  Change take_by_force(const RobotId& robot, const Client& client, const std::string& reason);
   Result<Change> release(const RobotId& robot, const std::string& actor);
   // Asks the holder for it. conflict when nobody holds it: take it.
-  Result<Change> request(const RobotId& robot, const std::string& actor);
+  Result<Change> request(const RobotId& robot, const Client& client);
   // To the actor that requested it.
   Result<Change> hand_over(const RobotId& robot, const std::string& actor);
 
@@ -59,8 +60,15 @@ class Authority {
   // control the robot by force.
   const Reservation* keeps_out(const RobotId& robot, const std::string& actor, microseconds ahead) const;
 
-  // Extends every lease of the actor to its duration from now.
-  void keep_alive(const std::string& actor);
+  // The holder, and which client of theirs keeps control; no actor: nobody.
+  Client client_of(const RobotId& robot) const;
+  // Whether that is this client, or nobody.
+  bool is_kept_by(const RobotId& robot, const Client& client) const;
+
+  // Extends the lease of the robot to its duration from now, if the client keeps it.
+  void keep_alive(const RobotId& robot, const Client& client);
+  // Every lease that the client keeps: of one that says no robot, and has no id.
+  void keep_all_alive(const Client& client);
 
   // Ends what has ended, and returns it.
   std::vector<Change> expire();
@@ -68,10 +76,11 @@ class Authority {
  private:
   struct Lease {
     std::string holder;
+    std::string client;            // its id
     std::int64_t taken_at_us = 0;  // UTC
     std::int64_t ends_us = 0;      // steady
     microseconds duration{0};
-    std::string requested_by;
+    Client requested_by;
     std::int64_t request_ends_us = 0;  // steady
     bool is_forced = false;            // no reservation ends it
   };
@@ -79,7 +88,8 @@ class Authority {
   bool is_live(const RobotId& robot, const Lease& lease) const;
   Result<void> check_reserved(const RobotId& robot, const std::string& actor) const;
   Lease* lease_of(const RobotId& robot);  // null when nobody holds it now
-  Lease& give(const RobotId& robot, const std::string& actor, microseconds duration);
+  Lease& give(const RobotId& robot, const Client& client, microseconds duration);
+  void extend(const RobotId& robot, Lease& lease, const Client& client) const;
   Result<Lease*> own_lease(const RobotId& robot, const std::string& actor);
 
   runtime::Clock& clock_;

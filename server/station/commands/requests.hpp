@@ -25,6 +25,7 @@ struct CommandRequest {
   protocol::Command action = rheonaut_Command_init_zero;
   std::string arguments = "{}";  // as JSON, for the record
   std::string actor;
+  std::string client;                    // its id, see Client
   std::string peer;                      // the address that it came from
   microseconds time_to_live{2'000'000};  // at most 10 s, from when it was issued
   microseconds answer_grace{50'000};     // the robot's answer may come so long after it; then it is unknown
@@ -61,6 +62,8 @@ struct ControlRequest {
   microseconds lease{kControlLease};  // take: without a sign of life; at most kLongestControl
   std::string reason;                 // force: why
   microseconds age{0};                // take, force: of what its page saw; above kOldestSight it begins nothing
+  std::string client{};               // its id, see Client
+  bool with_orders = false;  // take: from another client of the actor, with what waits on the robot for its time
 };
 
 }  // namespace server::station

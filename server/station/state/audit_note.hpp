@@ -14,6 +14,7 @@ struct Author {
   std::string actor;       // "user:anna/session:4", "token:ci", "station", "loopback", "cli:root"; empty: nobody said
   std::string peer;        // the address it came from; empty: from no other machine, or not known
   std::int64_t at_us = 0;  // UTC
+  std::string client{};    // the id of its tab or tool; empty: it gave none
 };
 
 struct AuditNote {

@@ -61,6 +61,7 @@ struct Experiment {
   ExperimentRequest request;
   std::string owner;     // the actor who asked for it
   std::string acts_for;  // the actor in whose name it commands the robot
+  std::string client;    // of that actor, the page or program in whose hands it is; not on disk. Empty: it has no id
   std::string reason;    // of paused and of one that ended, for programs, e.g. "nobody_present"; empty: none
   std::string detail;    // the same in words
   // SAFETY: it does not begin before somebody has released it, after an abort or a restart of the station.

@@ -157,7 +157,7 @@ std::shared_ptr<std::optional<Answered>> ApiTest::begin(const std::string& metho
   if (!body.is_null()) request.body = body.dump();
   request.actor = actor;
   request.peer = "127.0.0.1";
-  request.caller = identity::Caller{actor, "", scopes, session, standing, "127.0.0.1"};
+  request.caller = identity::Caller{actor, "", scopes, session, standing, "127.0.0.1", client};
   auto into = std::make_shared<std::optional<Answered>>();
   tasks.spawn("ask", answer(std::move(request), into));
   clock.settle();
@@ -178,6 +178,11 @@ Answered ApiTest::ask(const std::string& method, const std::string& target, cons
 void ApiTest::make_samples(TestRobot& from, std::uint64_t first_seq, pb_size_t count) {
   from.send_samples(first_seq, count, from.robot_now_us(), 0);
   clock.settle();
+}
+
+std::optional<std::int64_t> ApiTest::seen_us(std::int64_t experiment) const {
+  const experiments::Life* life = parts_->experiments.life_of(experiment);
+  return life == nullptr ? std::nullopt : life->seen_us;
 }
 
 std::string ApiTest::token() const {

@@ -95,6 +95,7 @@ class ApiTest : public ::testing::Test {
   // The server of the API.
   std::uint16_t port() const;
   std::string login_url();
+  std::optional<std::int64_t> seen_us(std::int64_t experiment) const;  // by the client in whose hands it is
   const http::Router& router() const;
   identity::Accounts& accounts();
   const identity::Logins& logins() const;
@@ -102,6 +103,7 @@ class ApiTest : public ::testing::Test {
   identity::Scopes scopes = identity::Scopes::of(identity::Role::admin);  // of who asks
   std::string actor = "token:local";                                      // likewise
   std::uint64_t session = 0;                                              // likewise: of a page
+  std::string client;                                                     // likewise: its id
   config::Config config;                                                  // of the ports
   TemporaryFolder folder;
   boost::asio::io_context loop{1};

@@ -43,19 +43,45 @@ TEST_F(ExperimentRoutesTest, ASignOfLifeIsAsOldAsWhatTheScriptHasSeen) {
   pass(1);
   ASSERT_EQ(begin_one(rest(20)).status, 202);
   const json first = ask("POST", "/api/v1/experiments/1/keep-alive").parsed();
-  const std::int64_t seen_us = station.seen_us("token:local").value();
+  const std::int64_t seen = seen_us(1).value();
   clock.run_for(500ms);
   const json stamp{{"stamp_us", first.at("stamp_us")}};
   const Answered late = ask("POST", "/api/v1/experiments/1/keep-alive", stamp);
   ASSERT_EQ(late.status, 200) << late.body;
-  EXPECT_EQ(station.seen_us("token:local"), seen_us) << "it is no sign of life";
+  EXPECT_EQ(seen_us(1), seen) << "it is no sign of life";
   ask("POST", "/api/v1/experiments/1/keep-alive", {{"stamp_us", late.parsed().at("stamp_us")}});
-  EXPECT_GT(station.seen_us("token:local"), seen_us);
-  const auto now_us = station.seen_us("token:local");
+  EXPECT_GT(seen_us(1), seen);
+  const auto now_us = seen_us(1);
   clock.run_for(100ms);
   EXPECT_EQ(ask("POST", "/api/v1/experiments/1/keep-alive", {{"stamp_us", 1LL << 60}}).status, 200);
-  EXPECT_EQ(station.seen_us("token:local"), now_us) << "of an earlier boot of the machine";
+  EXPECT_EQ(seen_us(1), now_us) << "of an earlier boot of the machine";
   EXPECT_EQ(ask("POST", "/api/v1/experiments/1/keep-alive", {{"stamp", 1}}).status, 400);
+}
+
+// SAFETY: two programs with one token are two clients.
+TEST_F(ExperimentRoutesTest, ASignOfLifeIsOfTheProgramThatBeganIt) {
+  client = "script-one";
+  ASSERT_EQ(begin_one(rest(20)).status, 202);
+  EXPECT_EQ(get(1)["client"], "script-one");
+  const std::int64_t seen = seen_us(1).value();
+  clock.run_for(100ms);
+  for (const char* other : {"script-two", ""}) {
+    client = other;
+    const Answered refused = ask("POST", "/api/v1/experiments/1/keep-alive");
+    EXPECT_EQ(refused.status, 409);
+    EXPECT_EQ(refused.parsed()["reason"], "acts_for_another");
+    EXPECT_THAT(refused.parsed()["detail"].get<std::string>(), HasSubstr("another page or program of token:local"));
+  }
+  EXPECT_EQ(seen_us(1), seen);
+  client = "script-one";
+  EXPECT_EQ(ask("POST", "/api/v1/experiments/1/keep-alive").status, 200);
+  EXPECT_GT(seen_us(1), seen);
+  client = "script-two";
+  ASSERT_EQ(ask("POST", "/api/v1/experiments/1/take-over").status, 200);
+  EXPECT_EQ(ask("POST", "/api/v1/experiments/1/keep-alive").status, 200);
+  EXPECT_EQ(get(1)["client"], "script-two");
+  const json entry = ask("GET", "/api/v1/audit?action=experiment.taken_over").parsed()["entries"][0];
+  EXPECT_EQ(entry["detail"]["by"], "token:local, script script-t");
 }
 
 TEST_F(ExperimentRoutesTest, IsQueuedRecordedAndShown) {

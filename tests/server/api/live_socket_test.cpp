@@ -8,8 +8,9 @@ namespace {
 class LiveSocketTest : public ApiTest {
  protected:
   std::string bearer() const { return "Authorization: Bearer " + token() + "\r\n"; }
-  std::unique_ptr<Page> open_page() {
-    auto page = std::make_unique<Page>(clock, port(), bearer());
+  std::unique_ptr<Page> open_page(const std::string& target = "/live") {
+    const auto nothing = [] {};
+    auto page = std::make_unique<Page>(clock, port(), bearer(), "127.0.0.1", nothing, target);
     EXPECT_TRUE(page->open()) << page->answer;
     return page;
   }
@@ -113,6 +114,82 @@ TEST_F(LiveSocketTest, RenewsALeaseWithAFreshStampOnly) {
   EXPECT_EQ(page->receive("problem")["problem"]["reason"], "stale");
   renew(clock.steady_us() + 1);
   EXPECT_EQ(page->receive("problem")["problem"]["reason"], "stale");
+  EXPECT_EQ(commands(rheonaut_Command_renew_lease_tag).size(), 1U);
+}
+
+// SAFETY: a tab and its copy, with the same id in its storage, are two clients.
+TEST_F(LiveSocketTest, ATabAndItsCopyAreTwoClients) {
+  const auto client_of = [](Page& page) { return page.receive("welcome").value("client", ""); };
+  auto copied = open_page("/live?client=tab-one-&page=first-load");
+  EXPECT_EQ(client_of(*copied), "tab-one-");
+  {
+    const auto copy = open_page("/live?client=tab-one-&page=other-load");
+    const std::string given = client_of(*copy);
+    EXPECT_TRUE(identity::is_client_id(given)) << given;
+    EXPECT_NE(given, "tab-one-");
+    const auto again = open_page("/live?client=tab-one-&page=first-load");
+    EXPECT_EQ(client_of(*again), "tab-one-") << "the first page, whose connection was broken";
+    EXPECT_EQ(client_of(*open_page("/live?client=short&page=first-load")), "") << "no id";
+    EXPECT_EQ(client_of(*open_page("/live")), "");
+  }
+  clock.settle();
+  EXPECT_NE(client_of(*open_page("/live?client=tab-one-&page=other-load")), "tab-one-") << "the first one is open";
+  copied.reset();
+  clock.settle();
+  EXPECT_EQ(client_of(*open_page("/live?client=tab-one-&page=second-load")), "tab-one-") << "it was loaded again";
+}
+
+// SAFETY: a page keeps what it names, and nothing of another page or program of the same actor.
+TEST_F(LiveSocketTest, ASignOfLifeIsForWhatItNames) {
+  connect_robot();
+  const auto page = open_page("/live?client=tab-one-&page=first-load");
+  const auto other = open_page("/live?client=tab-two-&page=other-load");
+  const auto nameless = open_page();
+  const auto say = [&](Page& by, const json& robots) {
+    json sign{{"type", "keep_alive"}, {"stamp_us", clock.steady_us()}};
+    if (!robots.is_null()) sign["robots"] = robots;
+    by.say(sign);
+  };
+  client = "tab-one-";
+  ASSERT_EQ(ask("POST", "/api/v1/robots/r1/control", {{"action", "take"}}).status, 200);
+  for (int i = 0; i < 5; ++i) {
+    clock.run_for(1s);
+    say(*page, {"r1", "r9"});
+  }
+  EXPECT_EQ(station.holder("r1"), "token:local");
+  for (int i = 0; i < 4; ++i) {
+    clock.run_for(1s);
+    say(*page, json::array({"r2"}));
+    say(*other, {"r1"});
+    say(*nameless, nullptr);
+  }
+  EXPECT_EQ(station.holder("r1"), "");
+
+  client = "";
+  ASSERT_EQ(ask("POST", "/api/v1/robots/r1/control", {{"action", "take"}}).status, 200);
+  for (int i = 0; i < 5; ++i) {
+    clock.run_for(1s);
+    say(*nameless, nullptr);
+  }
+  EXPECT_EQ(station.holder("r1"), "token:local") << "a client without an id counts for the control that it holds";
+  page->say({{"type", "keep_alive"}, {"robots", {1}}});
+  EXPECT_EQ(page->receive("problem")["problem"]["reason"], "malformed");
+  page->say({{"type", "keep_alive"}, {"experiments", {-1}}});
+  EXPECT_EQ(page->receive("problem")["problem"]["reason"], "malformed");
+}
+
+TEST_F(LiveSocketTest, OnlyTheClientThatHoldsADutyRenewsIt) {
+  connect_robot();
+  client = "tab-one-";
+  ASSERT_EQ(ask("POST", "/api/v1/robots/r1/control", {{"action", "take"}}).status, 200);
+  const auto renew = [&](Page& by) {
+    by.say({{"type", "renew_lease"}, {"robot_id", "r1"}, {"stamp_us", clock.steady_us()}});
+  };
+  const auto other = open_page("/live?client=tab-two-&page=other-load");
+  renew(*other);
+  EXPECT_EQ(commands(rheonaut_Command_renew_lease_tag).size(), 0U);
+  const auto page = open_page("/live?client=tab-one-&page=first-load");
+  renew(*page);
   EXPECT_EQ(commands(rheonaut_Command_renew_lease_tag).size(), 1U);
 }
 

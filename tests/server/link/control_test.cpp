@@ -151,13 +151,13 @@ TEST_F(ControlTest, APageThatGoesSilentLosesControlAndItIsSaid) {
   submit_as("session:1", set_duty(0.1F));
   for (int i = 0; i < 5; ++i) {
     clock.run_for(1s);
-    station.keep_control("session:1", 400ms);
+    station.keep_control({"session:1", ""}, std::nullopt, 400ms);
   }
   EXPECT_EQ(station.find("r1")->control.holder, "session:1");
   for (int i = 0; i < 4; ++i) {
     clock.run_for(1s);
-    station.keep_control("session:1", 401ms);  // SAFETY: an echo of an old picture keeps nothing
-    station.keep_control("session:1", -1us);
+    station.keep_control({"session:1", ""}, std::nullopt, 401ms);  // SAFETY: an echo of an old picture keeps nothing
+    station.keep_control({"session:1", ""}, std::nullopt, -1us);
   }
   EXPECT_EQ(station.find("r1")->control.holder, "");
   EXPECT_EQ(sink.events.back().kind, "control_expired");

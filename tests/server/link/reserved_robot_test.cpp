@@ -56,7 +56,7 @@ TEST_F(ReservedRobotTest, WhenASlotBeginsWhatOthersLeftWaitingIsDroppedAndItIsIn
   EXPECT_FALSE(station.find("r1")->reservation) << "it does not run yet";
   admit(timed(set_setpoint(0.1F), in_ms(6000), "ben"));
   clock.run_for(1500ms);
-  station.keep_control("ben", 0us);
+  station.keep_control({"ben", ""}, "r1", 0us);
   EXPECT_EQ(drops(), 0U);
   EXPECT_EQ(station.find("r1")->control.holder, "ben");
   clock.run_for(1s);

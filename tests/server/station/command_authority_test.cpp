@@ -56,10 +56,10 @@ TEST_F(CommandAuthorityTest, ByAnOldPictureNobodyTakesControlOrRenewsALease) {
 TEST_F(CommandAuthorityTest, ControlEndsWithoutASignOfLifeAndAnOldPictureIsNone) {
   ASSERT_TRUE(take("anna"));
   clock.run_for(station::kControlLease / 2);
-  authority.keep("anna", microseconds{0});
+  authority.keep({"anna", ""}, "r1", microseconds{0});
   clock.run_for(station::kControlLease - microseconds{1'000});
   EXPECT_TRUE(authority.expire().empty());
-  authority.keep("anna", station::kOldestSight * 2);
+  authority.keep({"anna", ""}, "r1", station::kOldestSight * 2);
   clock.run_for(microseconds{2'000});
   ASSERT_EQ(authority.expire().size(), 1u);
   EXPECT_EQ(authority.of("r1").holder, "");

@@ -33,14 +33,14 @@ class LiveStateTest : public EntryTest {
 TEST_F(LiveStateTest, AnotherBootBeginsAnewAndTheSameGoesOn) {
   robot.next_seq = 100;
   robot.at_power_s = 3;
-  entry.timed.by = "session:1";
+  entry.timed.by = {"session:1", ""};
   connect(7);
   EXPECT_EQ(robot.link, station::LinkState::connected);
   EXPECT_EQ(robot.next_seq, 100u);
-  EXPECT_EQ(entry.timed.by, "session:1");
+  EXPECT_EQ(entry.timed.by.actor, "session:1");
   connect(8);
   EXPECT_EQ(robot.next_seq, 40u);
-  EXPECT_EQ(entry.timed.by, "");
+  EXPECT_EQ(entry.timed.by.actor, "");
   EXPECT_EQ(robot.at_power_s, 3) << "the motor has not cooled down";
   EXPECT_EQ(entry.connected_at_robot_us, 2'000'000u);
 }

@@ -16,6 +16,7 @@ export const experiment = (experiment_id: number, change: Partial<ExperimentSumm
   notes: '',
   owner: 'session:1',
   acts_for: 'session:1',
+  client: null,
   runs_planned: 1,
   duration_s: 40,
   created_at_us: experiment_id * 1000,

@@ -2,7 +2,7 @@
 
 import type { Acts } from './acts';
 import { may_command } from './acts';
-import { has_ended, type ExperimentSummary } from '../../experiments_store';
+import { has_ended, is_in_hands_of, type ExperimentSummary } from '../../experiments_store';
 import type { Session } from '../../session';
 import { who } from './words';
 
@@ -18,7 +18,7 @@ export function ActsOfOne({ session, experiment, acts }: ActsOfOneProps) {
   if (has_ended(experiment)) return null;
   const me = store.actor.value;
   const is_current = store.is_current.value;
-  const is_mine = acts_for === me;
+  const is_mine = is_in_hands_of(experiment, me, store.client.value);
   const commands = may_command(session);
   const is_busy = acts.pending.value !== '';
   const holder = store.find(robot_id)?.state.value.control?.holder ?? '';
@@ -41,7 +41,7 @@ export function ActsOfOne({ session, experiment, acts }: ActsOfOneProps) {
           Pause
         </button>
       )}
-      {commands && is_mine && may_resume && moves('resume-experiment', 'Resume', 'resume', experiments.resume)}
+      {commands && acts_for === me && may_resume && moves('resume-experiment', 'Resume', 'resume', experiments.resume)}
       {commands && !is_mine && state !== 'aborting' && holder !== '' && holder !== me && (
         <span class="quiet">
           To take it over, first take control of {robot_id} from {who(holder)}.
@@ -73,6 +73,7 @@ export function Presence({ session, experiment }: Omit<ActsOfOneProps, 'acts'>) 
   const me = session.store.actor.value;
   if (has_ended(experiment)) return null;
   const { acts_for, unattended, state } = experiment;
+  const is_mine = is_in_hands_of(experiment, me, session.store.client.value);
   if (unattended) {
     const begins = state === 'waiting' ? ' Somebody must be there when it begins.' : '';
     return (
@@ -83,9 +84,11 @@ export function Presence({ session, experiment }: Omit<ActsOfOneProps, 'acts'>) 
   }
   return (
     <p class="presence" id="presence">
-      {acts_for === me
-        ? 'It acts in the name of this page, which must stay open: closed or cut off, a duty ends within 0.9 s, and the experiment after 3 s.'
-        : `It acts in the name of ${who(acts_for)}, and goes on only while they are there.`}
+      {is_mine
+        ? 'It is in the hands of this page, which must stay open: closed or cut off, a duty ends within 0.9 s, and the experiment after 3 s.'
+        : acts_for === me
+          ? 'It is in the hands of another page or program of yours, and goes on only while that is there.'
+          : `It acts in the name of ${who(acts_for)}, and goes on only while they are there.`}
     </p>
   );
 }

@@ -2,7 +2,7 @@
 
 import { useSignal } from '@preact/signals';
 import { useEffect } from 'preact/hooks';
-import { has_ended, type ExperimentSummary } from '../../experiments_store';
+import { has_ended, is_in_hands_of, type ExperimentSummary } from '../../experiments_store';
 import { Choice } from '../../parts/choice';
 import { change_query, format } from '../../route';
 import type { Session } from '../../session';
@@ -129,7 +129,7 @@ function RobotQueue({ session, robot_id, acts }: { session: Session; robot_id: s
                       Resume
                     </button>
                   )}
-                  {commands && each.acts_for !== me && (
+                  {commands && !is_in_hands_of(each, me, session.store.client.value) && (
                     <button
                       type="button"
                       disabled={!is_current || is_busy}
