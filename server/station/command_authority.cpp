@@ -16,6 +16,11 @@ bool is_of_old_picture(const CommandRequest& request) {
   return is_of_picture && !is_fresh(request.age);
 }
 
+// Whoever moves the robot, or ends its motion, has it in hand; not who sets a parameter.
+bool steers(const protocol::Command& command) {
+  return moves_the_motor(command) || command.which_action == rheonaut_Command_set_mode_tag;
+}
+
 std::unexpected<Error> too_old(microseconds age, const char* what) {
   return fail(ErrorCode::conflict,
               fmt::format("what was seen is {} ms old; at most {} {}", age / kMs, kOldestSight / kMs, what), "stale");
@@ -60,14 +65,14 @@ Result<void> CommandAuthority::check_sight(const CommandRequest& request) const 
 }
 
 bool CommandAuthority::changes_client(const CommandRequest& request) const {
-  const bool may_take = request.takes_control && needs_control(request.action) && !is_of_old_picture(request);
+  const bool may_take = request.takes_control && steers(request.action) && !is_of_old_picture(request);
   const Client now = authority_.client_of(request.robot_id);
   return may_take && now.actor == request.actor && now.id != request.client;
 }
 
 std::optional<Authority::Change> CommandAuthority::on_commanded(const CommandRequest& request) {
   if (!needs_control(request.action) || is_of_old_picture(request)) return std::nullopt;
-  auto change = authority_.use(request.robot_id, {request.actor, request.client});
+  auto change = authority_.use(request.robot_id, {request.actor, request.client}, steers(request.action));
   return change ? std::move(*change) : std::nullopt;
 }
 

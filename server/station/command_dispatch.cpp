@@ -49,9 +49,10 @@ Result<void> check_request(const CommandRequest& request, const protocol::Comman
   return check_command(wire, entry.robot, envelope, entry.orders_ahead(&wire));
 }
 
-void note_timed(TimedOrders& timed, const CommandRequest& request, const PendingCommand& pending) {
+void note_timed(TimedOrders& timed, const Client& holder, const CommandRequest& request,
+                const PendingCommand& pending) {
   if (!pending.is_timed_order()) return;
-  timed.by = {request.actor, request.client};
+  timed.by = holder.actor == request.actor ? holder : Client{request.actor, request.client};
   timed.until_robot_us = std::max(timed.until_robot_us, pending.wire.execute_at_robot_us);
 }
 
@@ -90,7 +91,7 @@ Result<std::shared_ptr<PendingCommand>> dispatch(StationParts& parts, RobotEntry
                 "queue_full");
   }
   take_control(parts, request, *pending);
-  note_timed(entry.timed, request, *pending);
+  note_timed(entry.timed, parts.control.client_of(request.robot_id), request, *pending);
   entry.commands.add(pending);
   parts.notifier.publish(pending->record);
   return pending;

@@ -188,9 +188,10 @@ Result<ControlState> Station::control(const ControlRequest& request) {
                  refused_control(text(request.action)), change.error());
     return std::unexpected{change.error()};
   }
-  if (*change) parts_->publish(**change, request.actor, request.peer);
   const Client now = parts_->control.client_of(request.robot_id);
-  if (request.with_orders && entry->timed.by.actor == now.actor) entry->timed.by = now;
+  const bool keeps_orders = request.orders_of && entry->timed.by == Client{request.actor, *request.orders_of};
+  if (keeps_orders) entry->timed.by = now;
+  if (*change) parts_->publish(**change, request.actor, request.peer);
   parts_->drop_outdated(*entry);
   return parts_->control.of(request.robot_id);
 }

@@ -108,6 +108,57 @@ TEST_F(ExperimentClientsTest, WhoTakesItOverKeepsItAlone) {
   expect_aborted(id, "nobody_present", 10s);
 }
 
+// What waits on the robot for its time is the experiment's, and goes on with it.
+TEST_F(ExperimentClientsTest, WhoTakesItOverBreaksNoStepOffThatWaitsOnTheRobot) {
+  std::string steps;
+  for (int step = 0; step < 60; ++step) {
+    steps += fmt::format("[[step]]\nkind = \"setpoint\"\nsetpoint_m = {}\nfor_s = 0.2\n", step % 2 == 0 ? 0.01 : 0.02);
+  }
+  const ExperimentId id = begin_by(kFirst, profile({}, "") + steps);
+  pass(4s, [&] { sign(kFirst, id); });
+  ASSERT_EQ(view(id).experiment.state, ExperimentState::running);
+  const std::int64_t now_us = clock.steady_us();
+  ASSERT_TRUE(wait_for(experiments->take_over(id, author(kSecond), now_us)));
+  for (int tenth = 0; tenth < 150 && view(id).experiment.state == ExperimentState::running; ++tenth) {
+    pass(100ms, [&] { sign(kSecond, id); });
+  }
+  EXPECT_EQ(view(id).experiment.state, ExperimentState::done) << view(id).experiment.detail;
+  EXPECT_EQ(nlohmann::json::parse(view(id).experiment.runs.at(0).steps).size(), 60U) << "none was repeated";
+}
+
+// A person changes what the experiment has asked them to, by another tool.
+TEST_F(ExperimentClientsTest, AParameterSetByAnotherToolChangesNoHands) {
+  const ExperimentId id = start_by(kFirst);
+  station::CommandRequest request;
+  request.robot_id = "sim-1";
+  request.action = sim_robot::set_parameter("telemetry_batch", 5);
+  request.actor = kSecond.actor;
+  request.client = kSecond.id;
+  request.peer = "127.0.0.1";
+  ASSERT_TRUE(wait_for(station.submit(std::move(request))));
+  pass(2s, [&] { sign(kFirst, id); });
+  EXPECT_EQ(view(id).experiment.state, ExperimentState::running) << view(id).experiment.reason;
+  EXPECT_NE(duty(), 0);
+}
+
+TEST_F(ExperimentClientsTest, WhoResumesItHasControlBackFromAnotherPageOfTheActor) {
+  const ExperimentId id = start_by(kFirst);
+  station::ControlRequest take;
+  take.robot_id = "sim-1";
+  take.actor = kSecond.actor;
+  take.client = kSecond.id;
+  ASSERT_TRUE(station.control(take));
+  pass(1s, [&] { sign(kFirst, id); });
+  ASSERT_EQ(view(id).experiment.reason, "control_changed");
+  ASSERT_TRUE(wait_for(experiments->resume(id, author(kFirst))));
+  pass(3s, [&] {
+    sign(kFirst, id);
+    station.keep_control(kSecond, "sim-1", 0us);
+  });
+  EXPECT_EQ(view(id).experiment.state, ExperimentState::running) << view(id).experiment.reason;
+  EXPECT_NE(duty(), 0);
+}
+
 TEST_F(ExperimentClientsTest, WhatAToolPerformsMayBeResumedFromAnotherTerminal) {
   const ExperimentId id = start_by(kFirst);
   ASSERT_TRUE(wait_for(experiments->pause(id, author(kSecond))));

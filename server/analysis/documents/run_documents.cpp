@@ -29,7 +29,7 @@ std::unexpected<Error> was_ended() { return fail(ErrorCode::conflict, "cancelled
 
 MetricsOfRun with_missed_ticks(storage::Run run, storage::StoredMetrics metrics, bool is_kept) {
   json document = json::parse(metrics.document, nullptr, false);
-  add_missed_ticks(document, run);
+  if (document.is_object()) add_missed_ticks(document, run);
   metrics.document = base::dump(document);
   return {std::move(run), std::move(metrics), is_kept};
 }

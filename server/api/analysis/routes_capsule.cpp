@@ -110,6 +110,7 @@ asio::awaitable<Result<RunPapers>> papers_of(CapsuleRoutes parts, storage::Run r
   papers.snapshot = std::move(*snapshot);
   papers.designs = co_await designs_of(parts, run.id);
   papers.run = std::move(run);
+  papers.run.missed = metrics->run.missed;  // as the metrics have it
   co_return papers;
 }
 

@@ -41,7 +41,8 @@ AutotuneState::AutotuneState(std::optional<std::filesystem::path> file, const js
   if (file_ && std::filesystem::exists(*file_)) {
     document_ = read_document(*file_);
     refuse_another(*file_, document_.at("request"), request);
-    go_by(document_.value("client", std::string{}));
+    const json client = document_.value("client", json());
+    if (client.is_string()) go_by(client.get<std::string>());
     document_["client"] = invocation_id();  // of a file that had none
     write();
     return;

@@ -14,7 +14,7 @@ using nlohmann::json;
 
 namespace {
 
-constexpr int kFirstProblem = 300;
+constexpr int kFirstProblem = 300, kTakenOver = 409;
 constexpr std::string_view kEndedExperiment[] = {"done", "aborted", "cancelled", "interrupted"};
 
 bool has_ended(const json& experiment) {
@@ -44,7 +44,8 @@ json StationWork::finished_job(std::int64_t job_id) const {
 void StationWork::resume_what_was_left(std::int64_t experiment_id) const {
   const std::string target = fmt::format("/api/v1/experiments/{}", experiment_id);
   const json now = get(target);
-  const bool was_left = now.value("held", false) && now.value("reason", json()) == "nobody_present";
+  const json reason = now.value("reason", json());
+  const bool was_left = now.value("held", false) && (reason == "nobody_present" || reason == "station_restarted");
   if (now.at("state") == "waiting" && was_left) post(target + "/resume", json::object());
 }
 
@@ -55,9 +56,12 @@ json StationWork::finished_experiment(std::int64_t experiment_id) const {
     // Refused for one that has just ended, which the next look shows.
     const StationAnswer kept = ask_("POST", target + "/keep-alive", seen);
     if (kept.status == 200 && kept.body.contains("stamp_us")) seen["stamp_us"] = kept.body.at("stamp_us");
+    const bool is_of_others = kept.status == kTakenOver && kept.body.value("reason", "") == "acts_for_another";
     json experiment = get(fmt::format("{}?wait_ms={}", target, kLookMs));
     on_look_(experiment);
     if (has_ended(experiment)) return experiment;
+    // What others perform is looked on; what they let wait would be waited for without an end.
+    if (is_of_others && experiment.at("state") == "waiting") throw std::runtime_error{kept.body.value("detail", "")};
   }
 }
 

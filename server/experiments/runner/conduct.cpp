@@ -196,7 +196,8 @@ asio::awaitable<std::string> Conduct::predict(const TimeLine& line) {
 
 asio::awaitable<DriveEnd> Conduct::drive(TimeLine line) {
   co_await await_resumption();
-  if (!abort_) take_control();  // it may have come into other hands meanwhile
+  const bool is_there = experiment_.request.is_unattended || is_actor_there();
+  if (!abort_ && is_there) take_control();  // it may have come into other hands meanwhile
   check_robot();
   if (abort_) co_return DriveEnd{abort_};
   DriveRequest request{experiment_.request.robot_id, experiment_.acts_for, experiment_.client, peer(),

@@ -84,7 +84,7 @@ void Conduct::take_control() {
       holder == experiment_.acts_for && station.is_kept_by(robot_id, {experiment_.acts_for, experiment_.client});
   if (is_its_own && !experiment_.request.is_unattended) return;
   // SAFETY: what another page or program of the actor has taken meanwhile is not taken back.
-  if (!holder.empty() && !is_its_own && std::exchange(had_control_, true)) {
+  if (holder == experiment_.acts_for && !is_its_own && std::exchange(had_control_, true)) {
     return abort({"control_of_another", fmt::format("control is with another page or program of {}", holder)});
   }
   had_control_ = true;

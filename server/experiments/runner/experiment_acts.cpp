@@ -207,13 +207,14 @@ void Experiments::put_into_hands_of(Entry& entry, const station::Client& client,
 }
 
 // With what waits on the robot, as far as it is the experiment's.
-Result<void> Experiments::take_control_for(const Entry& entry, const station::Author& by) {
+Result<void> Experiments::take_control_for(const Entry& entry, const station::Client& client, const std::string& peer) {
   const station::RobotId& robot_id = entry.experiment.request.robot_id;
-  const bool is_free = parts_.station.holder(robot_id).empty();
-  if (!entry.conduct || (!is_free && parts_.station.is_kept_by(robot_id, {by.actor, by.client}))) return {};
-  station::ControlRequest request{.robot_id = robot_id, .actor = by.actor, .peer = by.peer, .reason = {}};
-  request.client = by.client;
-  request.with_orders = true;
+  const std::string holder = parts_.station.holder(robot_id);
+  const bool is_free = holder.empty(), has_it = !is_free && parts_.station.is_kept_by(robot_id, client);
+  if (!entry.conduct || has_it || (!is_free && holder != client.actor)) return {};
+  station::ControlRequest request{.robot_id = robot_id, .actor = client.actor, .peer = peer, .reason = {}};
+  request.client = client.id;
+  if (entry.experiment.acts_for == client.actor) request.orders_of = entry.experiment.client;
   if (entry.experiment.request.is_unattended) request.lease = station::kLongestControl;
   const auto taken = parts_.station.control(request);
   if (!taken) return std::unexpected{taken.error()};
@@ -291,13 +292,14 @@ asio::awaitable<Result<ExperimentView>> Experiments::resume(ExperimentId id, sta
   const ExperimentState state = state_of(*entry);
   const bool is_held = state == ExperimentState::waiting && experiment.is_held;
   if (state != ExperimentState::paused && !is_held) co_return wrong_state(view_of(*entry), "resumed");
+  // Into the hands of who resumes it, unless its client is there: a person may resume what their other tool performs.
+  // Control comes into the same hands, from whatever page or program of the actor has it.
+  const bool is_alone = !entry->life.seen_us || entry->life.absent_for_us(parts_.clock.steady_us()) > kAwayFor.count();
+  const station::Client client{by.actor, is_alone ? by.client : experiment.client};
+  if (auto taken = take_control_for(*entry, client, by.peer); !taken) co_return std::unexpected{taken.error()};
+  if (is_alone) put_into_hands_of(*entry, client, seen_at_us);
   experiment.is_held = false;
   experiment.reason.clear();
-  // Into the hands of who resumes it, unless its client is there: a person may resume what their other tool performs.
-  if (entry->life.absent_for_us(parts_.clock.steady_us()) > kAwayFor.count()) {
-    if (auto taken = take_control_for(*entry, by); !taken) co_return std::unexpected{taken.error()};
-    put_into_hands_of(*entry, {by.actor, by.client}, seen_at_us);
-  }
   entry->life.since_us = parts_.clock.steady_us();
   if (entry->conduct) entry->conduct->resume();
   co_return co_await stored(id, note_of(*entry, "resumed", by));
@@ -356,8 +358,9 @@ asio::awaitable<Result<ExperimentView>> Experiments::take_over(ExperimentId id, 
     co_return fail(ErrorCode::conflict, fmt::format("control of its robot is with {}; take that first", holder),
                    "not_in_control");
   }
-  if (auto taken = take_control_for(entry, by); !taken) co_return std::unexpected{taken.error()};
-  put_into_hands_of(entry, {by.actor, by.client}, seen_at_us);
+  const station::Client client{by.actor, by.client};
+  if (auto taken = take_control_for(entry, client, by.peer); !taken) co_return std::unexpected{taken.error()};
+  put_into_hands_of(entry, client, seen_at_us);
   co_return co_await stored(id, note_of(entry, "taken_over", by));
 }
 

@@ -148,7 +148,7 @@ class Experiments final : public station::StationSink {
   void begin_what_may();
   void hold_what_is_left_alone();
   void put_into_hands_of(Entry& entry, const station::Client& client, std::optional<std::int64_t> seen_at_us);
-  Result<void> take_control_for(const Entry& entry, const station::Author& by);
+  Result<void> take_control_for(const Entry& entry, const station::Client& client, const std::string& peer);
   void put_interrupted_to_rest();
   WaitReason wait_reason_of(const Entry& entry) const;
   WaitReason reserved_for_another(const storage::Experiment& experiment) const;  // empty: it is not, or not that soon

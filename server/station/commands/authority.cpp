@@ -78,10 +78,13 @@ Result<void> Authority::may_use(const RobotId& robot, const std::string& actor) 
   return held_by(robot, now.holder);
 }
 
-Result<std::optional<Authority::Change>> Authority::use(const RobotId& robot, const Client& client) {
+Result<std::optional<Authority::Change>> Authority::use(const RobotId& robot, const Client& client, bool steers) {
   Lease* lease = lease_of(robot);
   if (lease == nullptr || lease->holder != client.actor) return take(robot, client, kControlLease);
-  lease->client = client.id;
+  if (lease->client != client.id) {  // what another client of the actor asks of the robot beside it, changes no hands
+    if (steers) give(robot, client, kControlLease);
+    return std::nullopt;
+  }
   lease->ends_us = std::max(lease->ends_us, clock_.steady_us() + kControlLease.count());
   return std::nullopt;
 }

@@ -42,9 +42,9 @@ class Authority {
   // (reason "reserved"). So do all below but force and release.
   Result<void> may_use(const RobotId& robot, const std::string& actor) const;
 
-  // For a command of the client: control is its own afterwards, at least for kControlLease. conflict when another holds
-  // it.
-  Result<std::optional<Change>> use(const RobotId& robot, const Client& client);
+  // For a command of the client, which `steers` or does not: control is its own afterwards, at least for kControlLease.
+  // conflict when another holds it.
+  Result<std::optional<Change>> use(const RobotId& robot, const Client& client, bool steers = true);
 
   // `duration`: how long the lease lasts without a keep_alive(). A page calls that several times a second.
   Result<std::optional<Change>> take(const RobotId& robot, const Client& client, microseconds duration);

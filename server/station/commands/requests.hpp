@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -59,11 +60,11 @@ struct ControlRequest {
   std::string actor;
   std::string peer;  // the address that it came from
   ControlAction action = ControlAction::take;
-  microseconds lease{kControlLease};  // take: without a sign of life; at most kLongestControl
-  std::string reason;                 // force: why
-  microseconds age{0};                // take, force: of what its page saw; above kOldestSight it begins nothing
-  std::string client{};               // its id, see Client
-  bool with_orders = false;  // take: from another client of the actor, with what waits on the robot for its time
+  microseconds lease{kControlLease};       // take: without a sign of life; at most kLongestControl
+  std::string reason;                      // force: why
+  microseconds age{0};                     // take, force: of what its page saw; above kOldestSight it begins nothing
+  std::string client{};                    // its id, see Client
+  std::optional<std::string> orders_of{};  // take: what waits on the robot of this client of the actor goes on
 };
 
 }  // namespace server::station

@@ -56,6 +56,26 @@ std::vector<RunId> runs_with(SQLite::Database& database, const char* condition) 
   return runs;
 }
 
+// A page of the counts of a run, or why they cannot be read.
+struct CountedPage {
+  HeadTally tally;
+  bool has_more = false;
+  std::string problem{};
+};
+
+template <class Tally>
+CountedPage next_counted(SQLite::Database& database, Tally tally) {
+  CountedPage page;
+  try {
+    const SQLite::Transaction moment{database};
+    page.tally = tally(database);
+    page.has_more = page.tally.advance(database);
+  } catch (const std::exception& error) {  // as in next_page()
+    page.problem = runtime::text_of(error);
+  }
+  return page;
+}
+
 // Runs that ended before the last stop of the station, or under a version that made no digests.
 std::vector<RunId> runs_without_digest(SQLite::Database& database) { return runs_with(database, "format IS NULL"); }
 
@@ -88,8 +108,12 @@ asio::awaitable<void> RunDigester::run() {
 }
 
 asio::awaitable<void> RunDigester::count_missed_ticks(RunId run) {
-  RunDigest counts = co_await count(run);
-  auto job = [run, counts = std::move(counts)](Database& database) {
+  Result<RunDigest> counted = co_await count(run);
+  if (!counted) {
+    spdlog::error("the ticks that the robot missed in run {} cannot be counted: {}", run, counted.error().detail);
+    co_return;
+  }
+  auto job = [run, counts = std::move(*counted)](Database& database) {
     try {
       write_missed_ticks(database.handle(), run, counts);
     } catch (const SQLite::Exception&) {  // as in store(); counted after the next start
@@ -129,24 +153,26 @@ asio::awaitable<Result<CurrentDigest>> RunDigester::find(RunId run) {
     made = co_await stored(run);
   }
   if (made) co_return CurrentDigest{std::move(*made), true};
-  RunDigest counts = co_await count(run);
-  counts.made_at_us = clock_.utc_us();
-  co_return CurrentDigest{std::move(counts), false};
+  Result<RunDigest> counts = co_await count(run);
+  if (!counts) co_return std::unexpected{counts.error()};
+  counts->made_at_us = clock_.utc_us();
+  co_return CurrentDigest{std::move(*counts), false};
 }
 
-asio::awaitable<RunDigest> RunDigester::count(RunId run) {
-  auto begin = [run](SQLite::Database& database) { return HeadTally{read_digest_spans(database, run)}; };
-  HeadTally tally = co_await reader_.ask(std::move(begin));
-  bool has_more = true;
-  while (has_more) {
-    auto page = [tally = std::move(tally)](SQLite::Database& database) mutable {
-      const SQLite::Transaction moment{database};
-      const bool more = tally.advance(database);
-      return std::pair{more, std::move(tally)};
+asio::awaitable<Result<RunDigest>> RunDigester::count(RunId run) {
+  CountedPage page;
+  auto begin = [run](SQLite::Database& database) {
+    return next_counted(database, [run](SQLite::Database& of) { return HeadTally{read_digest_spans(of, run)}; });
+  };
+  page = co_await reader_.ask(std::move(begin));
+  while (page.problem.empty() && page.has_more) {
+    auto next = [tally = std::move(page.tally)](SQLite::Database& database) mutable {
+      return next_counted(database, [&tally](SQLite::Database&) { return std::move(tally); });
     };
-    std::tie(has_more, tally) = co_await reader_.ask(std::move(page));
+    page = co_await reader_.ask(std::move(next));
   }
-  co_return tally.counts();
+  if (!page.problem.empty()) co_return fail(ErrorCode::unavailable, page.problem, "unreadable");
+  co_return page.tally.counts();
 }
 
 asio::awaitable<void> RunDigester::wait_until_due() {

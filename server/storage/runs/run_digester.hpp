@@ -52,7 +52,7 @@ class RunDigester {
   boost::asio::awaitable<void> count_missed_ticks(RunId run);
   boost::asio::awaitable<bool> store(RunId run, RunDigest digest);
   boost::asio::awaitable<std::optional<RunDigest>> stored(RunId run);
-  boost::asio::awaitable<RunDigest> count(RunId run);
+  boost::asio::awaitable<Result<RunDigest>> count(RunId run);  // unavailable: it cannot be read
 
   runtime::Clock& clock_;
   Recorder& recorder_;

@@ -275,6 +275,28 @@ TEST_F(RunDigestTest, TheTicksOfAnOldDigestAreCountedAfterTheStart) {
   EXPECT_EQ(wait(runs_->find(id))->missed, std::nullopt) << "not of a part of the samples";
 }
 
+TEST_F(RunDigestTest, WhereTheTicksOfAnOldDigestCannotBeReadTheStationGoesOn) {
+  start();
+  const storage::RunId id = make_eventful_run();
+  final_digest(id);
+  stop();
+  change(
+      "UPDATE run_certificate SET missed_ticks = NULL, longest_missed_ticks = NULL;"
+      "ALTER TABLE run_span RENAME COLUMN last_seq TO last_one");
+  start();
+  clock_.run_for(1s);
+  EXPECT_EQ(number("SELECT count(*) FROM run_certificate WHERE missed_ticks IS NULL"), 1);
+  change("ALTER TABLE run_span RENAME COLUMN last_one TO last_seq");
+  clock_.run_for(5s);
+  robot_.boot_id += 1;
+  robot_.next_seq = robot_.oldest_seq = 0;
+  connect(robot_);
+  const storage::RunId next = create();
+  make(robot_, 20);
+  end(next);
+  EXPECT_EQ(final_digest(next).samples_live, 20u) << "its task has not ended";
+}
+
 TEST_F(RunDigestTest, ThereIsNoneOfAnOpenOrUnknownRun) {
   start();
   connect(robot_);
