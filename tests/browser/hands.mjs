@@ -96,9 +96,14 @@ export const hold = (page, selector, what, done) =>
   until(what, async () => {
     if (await done()) return true;
     const button = page.locator(selector);
-    if ((await button.count()) === 0 || !(await button.isEnabled())) return false;
-    await button.scrollIntoViewIfNeeded();
-    await button.hover();
+    if ((await button.count()) === 0) return false;
+    const at_hand = async () => {
+      if (!(await button.isEnabled({ timeout: 2000 }))) return false;
+      await button.scrollIntoViewIfNeeded({ timeout: 2000 });
+      await button.hover({ timeout: 2000 });
+      return true;
+    };
+    if (!(await at_hand().catch(() => false))) return false; // it was drawn anew, or has gone
     await page.mouse.down();
     await until(what, done, 8000).catch(() => undefined);
     await page.mouse.up();
