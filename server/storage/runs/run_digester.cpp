@@ -171,7 +171,7 @@ asio::awaitable<Result<RunDigest>> RunDigester::count(RunId run) {
     };
     page = co_await reader_.ask(std::move(next));
   }
-  if (!page.problem.empty()) co_return fail(ErrorCode::unavailable, page.problem, "unreadable");
+  if (!page.problem.empty()) co_return fail(ErrorCode::unavailable, page.problem);
   co_return page.tally.counts();
 }
 
