@@ -268,7 +268,7 @@ function Row({ run, is_chosen, is_current, on_choose }: RowProps) {
       <td class="number length">{is_open ? '' : length_text(run)}</td>
       <td class={`is-record ${tone}`}>
         {run.state !== 'ended' && <span class={`state ${run.state}`}>{state}</span>}
-        {!is_open && <span class={tone === '' ? 'complete' : ''}>{text}</span>}
+        {!is_open && <span class={text === 'complete' ? 'complete' : ''}>{text}</span>}
       </td>
       <td class="verdict">{run.verdict}</td>
     </tr>
