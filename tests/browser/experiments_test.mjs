@@ -86,6 +86,45 @@ async function look_at_one_that_runs() {
   return null;
 }
 
+// Null when the machine stood still for longer than an experiment waits for its page.
+async function begun_here(name) {
+  await is_at_rest();
+  await paste(profile(name, 120));
+  const id = await start();
+  await until('it runs', async () => (await experiment(id)).state !== 'waiting');
+  return (await experiment(id)).state === 'running' ? id : null;
+}
+const is_over = async (id) => (await experiment(id)).state !== 'running';
+const presence = (of, id, what) =>
+  until(`the page says ${what}`, async () => what.test(await of.locator('#presence').innerText({ timeout: 1000 }).catch(() => '')) || (await is_over(id)));
+
+async function kept_over_a_reload() {
+  const id = await begun_here('in these hands');
+  if (id === null) return null;
+  const { client } = await experiment(id);
+  await page.reload();
+  await presence(page, id, /It is in the hands of this page/);
+  if (await is_over(id)) return null;
+  assert.equal((await experiment(id)).client, client, 'the tab goes by its id over a reload');
+  return id;
+}
+
+async function taken_over() {
+  const id = await begun_here('into other hands');
+  if (id === null) return false;
+  const taker = await page.context().newPage();
+  await taker.goto(page.url());
+  await presence(taker, id, /It is in the hands of another page or program of yours/);
+  await taker.locator('#take-over:enabled').click({ timeout: 5000 }).catch(() => undefined);
+  await presence(taker, id, /It is in the hands of this page/);
+  await presence(page, id, /It is in the hands of another page or program of yours/);
+  const was_over = await is_over(id);
+  if (!was_over) await taker.locator('#abort-experiment').click();
+  await until('it is over', () => is_over(id));
+  await taker.close();
+  return !was_over;
+}
+
 const steps = {
   async 'a profile that comes with the program is predicted, and its check list says that nothing is in the way'() {
     await page.goto(await bench.login_link());
@@ -180,34 +219,15 @@ const steps = {
   },
 
   async 'it is in the hands of one tab, over a reload, until another takes it over'() {
-    await paste(profile('in these hands', 120));
-    const id = await start();
-    await shows('running');
-    const client = (await experiment(id)).client;
-    await page.reload();
-    await says(page, '#presence', /It is in the hands of this page/);
-    assert.equal((await experiment(id)).client, client, 'the tab goes by its id over a reload');
+    const id = await until('a reload keeps it', kept_over_a_reload, 3 * kLongestWait_ms);
     const other = await page.context().newPage(); // the same session
     await other.goto(page.url());
-    await says(other, '#presence', /It is in the hands of another page or program of yours/);
     await page.goto('about:blank');
-    await until('nobody is there for it', async () => ['aborted', 'paused'].includes((await experiment(id)).state));
+    await until('nobody is there for it', async () => (await experiment(id)).state !== 'running');
     assert.equal((await experiment(id)).reason, 'nobody_present', 'the other tab is another client');
-    await is_at_rest();
     await other.close();
     await page.goto(bench.http);
-
-    await paste(profile('into other hands', 120));
-    const taken = await start();
-    await shows('running');
-    const taker = await page.context().newPage();
-    await taker.goto(page.url());
-    await taker.locator('#take-over:enabled').click();
-    await says(taker, '#presence', /It is in the hands of this page/);
-    await says(page, '#presence', /It is in the hands of another page or program of yours/);
-    await taker.locator('#abort-experiment').click();
-    await until('it is over', async () => (await experiment(taken)).state === 'aborted');
-    await taker.close();
+    await until('another tab takes it over', taken_over, 3 * kLongestWait_ms);
     await is_at_rest();
   },
 
