@@ -223,7 +223,7 @@ const steps = {
     const other = await page.context().newPage(); // the same session
     await other.goto(page.url());
     await page.goto('about:blank');
-    await until('nobody is there for it', async () => (await experiment(id)).state !== 'running');
+    await until('nobody is there for it', async () => ['aborted', 'paused'].includes((await experiment(id)).state));
     assert.equal((await experiment(id)).reason, 'nobody_present', 'the other tab is another client');
     await other.close();
     await page.goto(bench.http);
