@@ -60,7 +60,7 @@ json StationWork::finished_experiment(std::int64_t experiment_id) const {
     json experiment = get(fmt::format("{}?wait_ms={}", target, kLookMs));
     on_look_(experiment);
     if (has_ended(experiment)) return experiment;
-    // What others perform is looked on; what they let wait would be waited for without an end.
+    // An experiment that waits in other hands may never begin; one that runs there ends by itself.
     if (is_of_others && experiment.at("state") == "waiting") throw std::runtime_error{kept.body.value("detail", "")};
   }
 }

@@ -88,7 +88,7 @@ class ExportTest : public RandomRecordingTest {
     return fmt::format(" {}", span.made().next - last.seq - 1);
   }
 
-  // Of two of one span: the ticks at which nothing was made, by the longer period of both.
+  // Ticks without a sample between two samples of one span, by the longer period of both.
   static std::uint64_t missed_between(const storage::StoredSample& before, const storage::StoredSample& after) {
     const double period_us = std::max(before.period_us, after.period_us);
     const auto us = static_cast<double>(after.robot_time_us - before.robot_time_us);
