@@ -16,7 +16,8 @@ bool is_of_old_picture(const CommandRequest& request) {
   return is_of_picture && !is_fresh(request.age);
 }
 
-// A command that moves the robot, or ends its motion, brings its client into control; one that sets a parameter does not.
+// A command that moves the robot, or ends its motion, brings its client into control; one that sets a parameter does
+// not.
 bool steers(const protocol::Command& command) {
   return moves_the_motor(command) || command.which_action == rheonaut_Command_set_mode_tag;
 }
