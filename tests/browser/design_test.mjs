@@ -220,10 +220,8 @@ const steps = {
 
   async 'nothing can be sent while the page is cut off, and what the robot ran is not shown as present'() {
     await page.locator('#design-push:enabled').waitFor();
-    await page.clock.install();
     bench.station.process.kill('SIGSTOP');
     try {
-      await page.clock.runFor(3000);
       await page.locator('#design-push:disabled').waitFor();
       await shows(page, '#design-push-note', /Cut off from the station/);
       await shows(page, '#design-push-state', /what it runs now is not known/);
@@ -231,7 +229,6 @@ const steps = {
     } finally {
       bench.station.process.kill('SIGCONT');
     }
-    await page.clock.resume();
     await is_in_state('push', 'done');
   },
 
