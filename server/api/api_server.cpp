@@ -75,6 +75,12 @@ ApiServer::ApiServer(boost::asio::io_context& loop, runtime::TaskGroup& tasks, r
   live_.keep_experiment = [&experiments](storage::ExperimentId id, const station::Client& client, microseconds age) {
     experiments.keep_alive(id, client, age);
   };
+  identity::Rights& rights = accounts_.rights();
+  const auto end_moves = [&station](const runtime::EndedRight& right) { station.end_right(right); };
+  rights.add({"what robots do", identity::Scope::command, [&station] { return station.acting(); }, end_moves});
+  rights.add({"experiments", identity::Scope::command, [&experiments] { return experiments.acting(); }, end_moves});
+  rights.add({"jobs", identity::Scope::record, [&jobs = recording.jobs] { return jobs.acting(); },
+              [&jobs = recording.jobs](const runtime::EndedRight& right) { jobs.end_right(right); }});
   add_routes(loop, station, live, recording, analysis, experiments);
 }
 
@@ -124,6 +130,7 @@ void ApiServer::add_routes(boost::asio::io_context& loop, station::Station& stat
 
 boost::asio::awaitable<void> ApiServer::run() {
   tasks_.spawn("accounts", accounts_.run());
+  tasks_.spawn("rights", accounts_.watch_rights());
   tasks_.spawn("lateness", lateness_.run(clock_));
   co_await server_.run();
 }

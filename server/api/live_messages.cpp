@@ -10,7 +10,7 @@
 #include "server/api/bodies/query_params.hpp"
 #include "server/api/routes/emergency.hpp"
 #include "server/http/http.hpp"
-#include "server/runtime/counted.hpp"
+#include "server/runtime/worker.hpp"
 #include "server/station/commands/recent_commands.hpp"
 
 namespace server::api {

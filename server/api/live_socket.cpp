@@ -96,7 +96,10 @@ class LivePage {
   // The boundary: a message that cannot be acted on ends neither the page nor the station.
   Result<void> act_on(const std::string& text) {
     try {
-      if (auto permitted = check_permission(scope_needed_by(text)); !permitted) return permitted;
+      const identity::Scope needed = scope_needed_by(text);
+      if (auto permitted = check_permission(needed); !permitted) return permitted;
+      // SAFETY: what came in one turn of the loop with the end of its right is nobody's; a stop is carried out.
+      if (auto stands = still_stands(caller_); !stands && needed != identity::Scope::stop) return stands;
       return on_page_message(text, caller_, queue_, parts_);
     } catch (...) {
       parts_.tasks.exceptions().note(runtime::Ended::request, "a message of " + caller_.actor + " on /live",

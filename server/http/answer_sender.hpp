@@ -8,6 +8,7 @@
 #include <boost/asio/experimental/awaitable_operators.hpp>
 #include <boost/asio/multiple_exceptions.hpp>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -17,6 +18,7 @@
 #include "server/http/deadline.hpp"
 #include "server/http/http_stream.hpp"
 #include "server/http/request_reading.hpp"
+#include "server/identity/caller.hpp"
 #include "server/runtime/exceptions.hpp"
 
 namespace server::http {
@@ -37,6 +39,21 @@ boost::asio::awaitable<std::optional<T>> while_present(HttpStream& stream, boost
     if (first.index() == 0) co_return std::move(std::get<0>(first));
     co_return std::nullopt;
   } catch (const boost::asio::multiple_exceptions&) {  // both were cancelled: the station stops, or the time is over
+    throw boost::system::system_error{boost::asio::error::operation_aborted};
+  }
+}
+
+// What the work gives, or nothing when the credential ends first that asked for it; null: nobody's, which never ends.
+template <class T>
+boost::asio::awaitable<std::optional<T>> while_it_stands(std::shared_ptr<identity::Standing> standing,
+                                                         boost::asio::awaitable<T> work) {
+  using namespace boost::asio::experimental::awaitable_operators;  // NOLINT: operators only
+  if (standing == nullptr) co_return co_await std::move(work);
+  try {
+    std::variant<T, std::monostate> first = co_await (std::move(work) || standing->wait_for_end());
+    if (first.index() == 0) co_return std::move(std::get<0>(first));
+    co_return std::nullopt;
+  } catch (const boost::asio::multiple_exceptions&) {
     throw boost::system::system_error{boost::asio::error::operation_aborted};
   }
 }

@@ -227,9 +227,17 @@ asio::awaitable<Next> HttpConnection::carry_out(Request request, RequestMessage 
     Response response = co_await answer(std::move(request));
     co_return co_await sender_.send(std::move(response), message);
   }
-  auto response = co_await while_present(stream_, answer(std::move(request)));
+  const std::shared_ptr<identity::Standing> standing = request.caller.standing;
+  const std::string actor = request.actor;
+  auto response = co_await while_present(stream_, while_it_stands(standing, answer(std::move(request))));
   if (!response) co_return Next::end;
-  co_return co_await sender_.send(std::move(*response), message);
+  if (!*response) {
+    co_return co_await sender_.send(problem(identity::credential_ended(actor)), message);
+  }
+  const bool is_long = (*response)->stream != nullptr;
+  auto sending = sender_.send(std::move(**response), message);
+  if (!is_long) co_return co_await std::move(sending);
+  co_return (co_await while_it_stands(standing, std::move(sending))).value_or(Next::end);
 }
 
 // SAFETY: a stop is carried out now, whatever comes with it; its body is looked at when it has been answered.

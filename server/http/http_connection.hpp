@@ -30,8 +30,8 @@
 #include "server/http/router.hpp"
 #include "server/http/upgrade.hpp"
 #include "server/net/port_access.hpp"
-#include "server/runtime/counted.hpp"
 #include "server/runtime/exceptions.hpp"
+#include "server/runtime/worker.hpp"
 
 namespace server::http {
 

@@ -5,7 +5,7 @@
 
 #include "server/http/answer_head.hpp"
 #include "server/http/http_connection.hpp"
-#include "server/runtime/counted.hpp"
+#include "server/runtime/worker.hpp"
 
 namespace server::http {
 namespace asio = boost::asio;

@@ -68,7 +68,7 @@ asio::awaitable<std::invoke_result_t<Job, AccountStore&>> Accounts::on_store(Job
 
 asio::awaitable<void> Accounts::run() {
   for (;;) {
-    sweep();
+    sessions_.sweep();
     const bool to_save = sessions_.revision() + token_uses_ != saved_revision_;
     const bool saved = !to_save || co_await save();
     if (saved && sessions_.revision() + token_uses_ != saved_revision_) continue;  // changed meanwhile
@@ -97,14 +97,6 @@ asio::awaitable<bool> Accounts::save() {
   std::error_code ignored;
   std::filesystem::remove(old_sessions_file_, ignored);  // its content is in the database now
   co_return true;
-}
-
-void Accounts::sweep() {
-  sessions_.sweep();
-  const std::int64_t now_us = clock_.utc_us();
-  for (Token& token : tokens_) {
-    if (token.expires_at_us != 0 && token.expires_at_us <= now_us) token.standing->end();
-  }
 }
 
 // A user's role bounds what their pages and tokens may do, at every request anew.
@@ -152,7 +144,17 @@ std::string Accounts::open_session(const std::string& user, const std::string& p
 }
 
 asio::awaitable<Result<void>> Accounts::end_session(std::uint64_t number, station::Author by) {
-  if (!sessions_.end(number)) co_return fail(ErrorCode::not_found, "there is no such session", "unknown_session");
+  const auto session = std::ranges::find(sessions_.all(), number, &Sessions::Open::number);
+  if (session == sessions_.all().end()) {
+    co_return fail(ErrorCode::not_found, "there is no such session", "unknown_session");
+  }
+  const std::string user = session->user, actor = actor_of(user, number);
+  sessions_.end(number);
+  const bool is_own = by.actor == actor || (!user.empty() && is_of(by.actor, user));
+  if (!is_own) {
+    end_right_of(actor,
+                 fmt::format("session {} of {} was ended by {}", number, user.empty() ? "a link" : user, by.actor));
+  }
   note(std::move(by), "account.session_ended", std::to_string(number), "{}", false);
   const bool saved = co_await save();
   if (saved) co_return Result<void>{};
@@ -213,14 +215,26 @@ asio::awaitable<Result<User>> Accounts::change_user(std::string name, UserChange
     known->second.disabled = known->second.disabled || change.disabled.value_or(false);
     renew_standing(name);
     if (known->second.disabled) sessions_.end_of_user(name);
+    const bool is_out = known->second.disabled;
+    const Scopes left = is_out ? Scopes{} : Scopes::of(known->second.role);
+    const std::string now = is_out ? "disabled" : fmt::format("made {}", text(known->second.role));
+    end_rights_of(name, left, fmt::format("user '{}' was {} by {}", name, now, by.actor));
+  }
+  // Somebody else who sets a password takes the pages from whoever has opened them.
+  if (known != users_.end() && change.password_hash && !is_of(by.actor, name)) {
+    end_pages_of(name, by.actor);
   }
   auto job = [name, change, by](AccountStore& store) { return store.change_user(name, change, by); };
   auto changed = co_await on_store(std::move(job));
   if (!changed) co_return std::unexpected{takes_rights ? not_stored(changed.error()) : changed.error()};
   const auto still = users_.find(name);  // not if it has been removed meanwhile
   if (still != users_.end()) still->second = *changed;
-  if (ends_sessions) sessions_.end_of_user(name);
-  renew_standing(name);
+  if (change.password_hash && !is_of(by.actor, name)) {
+    end_pages_of(name, by.actor);  // also one that was opened meanwhile, by the old password
+  } else if (ends_sessions) {
+    sessions_.end_of_user(name);
+  }
+  if (change.role || change.disabled) renew_standing(name);
   changed_.notify();
   co_return changed;
 }
@@ -231,6 +245,7 @@ asio::awaitable<Result<void>> Accounts::remove_user(std::string name, station::A
   for (Token& token : tokens_) {
     if (token.owner == name) end_token(token, by.at_us);
   }
+  end_rights_of(name, {}, fmt::format("user '{}' was removed by {}", name, by.actor));
   changed_.notify();
   auto job = [name, by](AccountStore& store) { return store.remove_user(name, by); };
   const auto removed = co_await on_store(std::move(job));
@@ -285,8 +300,10 @@ void Accounts::end_token(Token& token, std::int64_t utc_us) {
 }
 
 asio::awaitable<Result<ApiToken>> Accounts::revoke_token(std::string name, station::Author by) {
-  for (Token& token : tokens_) {
-    if (token.name == name) end_token(token, by.at_us);
+  const auto found = std::ranges::find(tokens_, name, &Token::name);
+  if (found != tokens_.end()) {
+    end_token(*found, by.at_us);
+    end_right_of("token:" + name, fmt::format("token '{}' was revoked by {}", name, by.actor));
   }
   auto job = [name, by](AccountStore& store) { return store.revoke_token(name, by); };
   const auto revoked = co_await on_store(std::move(job));

@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "server/identity/account_store.hpp"
+#include "server/identity/rights.hpp"
 #include "server/identity/sessions.hpp"
 #include "server/storage/ingest/recorder.hpp"
 
@@ -46,8 +47,12 @@ class Accounts {
   Accounts(boost::asio::io_context& loop, runtime::Clock& clock, storage::Recorder& recorder,
            const std::filesystem::path& data_dir);
 
-  // Writes what is to be written and ends what has run out, until cancelled.
+  Rights& rights() { return rights_; }
+
+  // Writes what is to be written, until cancelled.
   boost::asio::awaitable<void> run();
+  // Ends the rights that run out, and what acts without a right that is there, until cancelled.
+  boost::asio::awaitable<void> watch_rights();
 
   std::optional<Caller> caller_of_token(const std::string& secret);
   std::optional<Caller> caller_of_session(const std::string& secret);  // which is renewed
@@ -91,8 +96,15 @@ class Accounts {
   template <class Job>
   boost::asio::awaitable<std::invoke_result_t<Job, AccountStore&>> on_store(Job job);
   boost::asio::awaitable<bool> save();
-  void sweep();
   void end_token(Token& token, std::int64_t utc_us);
+  void end_expired();
+  void end_what_has_no_right() const;
+  std::string lacks(const std::string& actor, Scope needed) const;
+  void end_pages_of(const std::string& user, const std::string& by);
+  std::int64_t next_look_us() const;
+  void end_right_of(const std::string& actor, std::string why) const;
+  void end_rights_of(const std::string& user, Scopes left, std::string why) const;
+  bool is_of(const std::string& actor, const std::string& user) const;
   void renew_standing(const std::string& user);
   void note(station::Author by, const char* action, std::string subject, std::string detail, bool can_flood);
 
@@ -103,6 +115,7 @@ class Accounts {
   std::map<std::string, User> users_;
   std::list<Token> tokens_;
   Sessions sessions_;
+  Rights rights_;
   std::uint64_t token_uses_ = 0;  // grows with what is worth to be stored of tokens
   std::uint64_t saved_revision_ = 0;
   bool save_failed_ = false;

@@ -72,11 +72,15 @@ std::string Auth::cookie(const std::string& secret, bool is_secure) const {
 
 Result<void> still_stands(const Caller& caller) {
   if (caller.standing == nullptr || !caller.standing->ended()) return {};
-  return fail(
+  return std::unexpected{credential_ended(caller.actor)};
+}
+
+Error credential_ended(const std::string& actor) {
+  return {
       ErrorCode::forbidden,
       fmt::format("the credential of {} was revoked, has expired or has other rights now; sign in, or send it again",
-                  caller.actor),
-      "not_permitted");
+                  actor),
+      "not_permitted"};
 }
 
 }  // namespace server::identity

@@ -55,5 +55,6 @@ class Auth {
 
 // SAFETY: nobody's credential outlives a wait: what has ended meanwhile, or has other rights now, commands nothing.
 Result<void> still_stands(const Caller& caller);
+Error credential_ended(const std::string& actor);  // what is said then
 
 }  // namespace server::identity

@@ -3,8 +3,6 @@
 
 #include <spdlog/spdlog.h>
 
-#include "server/runtime/counted.hpp"
-
 namespace server::identity {
 namespace asio = boost::asio;
 

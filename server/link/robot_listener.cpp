@@ -5,7 +5,7 @@
 #include <spdlog/spdlog.h>
 
 #include "server/config/endpoint.hpp"
-#include "server/runtime/counted.hpp"
+#include "server/runtime/worker.hpp"
 
 namespace server::link {
 namespace asio = boost::asio;

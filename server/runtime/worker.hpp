@@ -18,9 +18,20 @@
 #include <type_traits>
 #include <utility>
 
-#include "server/runtime/counted.hpp"
-
 namespace server::runtime {
+
+// How many coroutines are inside some piece of work: each counts itself.
+template <class Number>
+class Counted {
+ public:
+  explicit Counted(Number& count) : count_{count} { ++count_; }
+  ~Counted() { --count_; }
+  Counted(const Counted&) = delete;
+  Counted& operator=(const Counted&) = delete;
+
+ private:
+  Number& count_;
+};
 
 class WorkerThread {
  public:

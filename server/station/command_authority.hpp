@@ -47,6 +47,9 @@ class CommandAuthority {
   // The client is still there, for this robot; none: for what it controls, of a client without an id.
   void keep(const Client& client, const std::optional<RobotId>& robot, microseconds age);
   std::vector<Authority::Change> expire() { return authority_.expire(); }
+  std::optional<Authority::Change> end_right(const RobotId& robot, const runtime::EndedRight& right) {
+    return authority_.end_right(robot, right);
+  }
 
  private:
   Reservations reservations_;

@@ -206,6 +206,23 @@ bool Station::is_kept_by(const RobotId& id, const Client& client) const {
   return parts_->control.is_kept_by(id, client);
 }
 
+void Station::end_right(const runtime::EndedRight& right) {
+  parts_->notifier.publish_right_ended(right);
+  for (auto& [id, entry] : parts_->robots.entries()) {
+    try {
+      parts_->end_right(entry, right);
+    } catch (const std::exception& error) {  // SAFETY: the others come to rest all the same
+      spdlog::error("what robot '{}' does in a name whose right has ended: {}", id, runtime::text_of(error));
+    }
+  }
+}
+
+std::set<std::string> Station::acting() const {
+  std::set<std::string> actors;
+  for (const auto& [id, entry] : parts_->robots.entries()) parts_->add_acting(entry, actors);
+  return actors;
+}
+
 asio::awaitable<void> Station::watch_control() {
   const RecordsAtTheEnd records_at_the_end{*parts_};
   for (;;) {

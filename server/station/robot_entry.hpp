@@ -50,6 +50,7 @@ struct RobotEntry {
   OrderTimeline orders;
   TimedOrders timed;
   ReportedConfiguration reported;
+  std::string moves_for;  // who was in control of this boot last: what it does, it does in their name; empty: nobody
   std::uint64_t connected_at_robot_us = 0;    // by its hello
   std::uint64_t latch_known_at_robot_us = 0;  // older telemetry says nothing about the latch
   EventLimit refusals{kEventPeriodUs};

@@ -60,6 +60,7 @@ void Station::on_connected(RobotLink& link, const AdmissionRequest& hello, const
   }
   const bool is_other_boot = robot.boot_id != hello.boot_id;
   const bool lost_its_latch = robot.latched() && is_other_boot && details.emergency_id == 0;
+  if (is_other_boot) entry.moves_for = parts_->control.of(robot.id).holder;
   begin_connection(entry, hello, details, admission, peer, parts_->clock.steady_us());
   parts_->publish_stops_of(
       [&](std::vector<CommandRecord>& made) { parts_->stops.on_connected(entry, lost_its_latch, made); });

@@ -1,8 +1,12 @@
 #include "server/station/sink_notifier.hpp"
 
+#include <spdlog/spdlog.h>
+
 #include <algorithm>
+#include <exception>
 #include <utility>
 
+#include "server/runtime/exceptions.hpp"
 #include "server/station/state/unknown_values.hpp"
 
 namespace server::station {
@@ -37,6 +41,26 @@ void SinkNotifier::publish(const RobotState& robot, const ClockRecord& record) {
 
 void SinkNotifier::publish(const RobotState& robot, const InForceRecord& record) {
   for (StationSink* sink : sinks_) sink->on_in_force(robot, record);
+}
+
+// SAFETY: a sink that fails keeps no other one, and no robot, from what is to end.
+template <class Call>
+void SinkNotifier::each(const runtime::EndedRight& right, Call call) {
+  for (StationSink* sink : sinks_) {
+    try {
+      call(*sink);
+    } catch (const std::exception& error) {
+      spdlog::error("what ends with a right ({}): {}", right.why, runtime::text_of(error));
+    }
+  }
+}
+
+void SinkNotifier::publish_right_ended(const runtime::EndedRight& right) {
+  each(right, [&right](StationSink& sink) { sink.on_right_ended(right); });
+}
+
+void SinkNotifier::publish_rest_owed(const RobotState& robot, const runtime::EndedRight& right) {
+  each(right, [&robot, &right](StationSink& sink) { sink.on_rest_owed(robot, right); });
 }
 
 void SinkNotifier::publish_fluid(const RobotState& robot) {

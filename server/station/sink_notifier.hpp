@@ -26,6 +26,8 @@ class SinkNotifier {
   void publish(const RobotState& robot, const ClockRecord& record);
   void publish(const RobotState& robot, const InForceRecord& record);
   void publish_stop_again(const CommandRecord& in_force);
+  void publish_right_ended(const runtime::EndedRight& right);
+  void publish_rest_owed(const RobotState& robot, const runtime::EndedRight& right);
   void publish_fluid(const RobotState& robot);
   void publish_unusable_samples(const RobotState& robot, std::uint64_t first_seq, std::uint64_t next_seq);
   void publish_unusable_event(const RobotState& robot, std::uint64_t event_seq);
@@ -38,6 +40,9 @@ class SinkNotifier {
   void note(const RobotState& robot, std::string kind, std::string detail, std::string cause = "none");
 
  private:
+  template <class Call>
+  void each(const runtime::EndedRight& right, Call call);
+
   runtime::Clock& clock_;
   std::vector<StationSink*> sinks_;
 };

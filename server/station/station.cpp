@@ -41,6 +41,7 @@ void Station::restore(const std::vector<RestoredRobot>& robots, const std::vecto
     entry.timed.is_of_earlier_run = restored.boot_id != 0;  // SAFETY: whose they are is not known any more
     robot.context.emergency_id = restored.emergency_id;     // SAFETY: the station's latch outlives the station
     robot.retired_at_us = restored.retired_at_us;
+    entry.moves_for = restored.moves_for;
     restore_fluid(robot, restored.fluid, parts_->envelope);
   }
   for (const CommandRecord& record : pending_stops) {

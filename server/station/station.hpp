@@ -13,12 +13,14 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
 #include "server/config/envelope.hpp"
 #include "server/config/link_settings.hpp"
 #include "server/runtime/clock.hpp"
+#include "server/runtime/ended_right.hpp"
 #include "server/runtime/result.hpp"
 #include "server/station/commands/client.hpp"
 #include "server/station/commands/requests.hpp"
@@ -76,7 +78,12 @@ class Station {
   void keep_control(const Client& client, const std::optional<RobotId>& robot, microseconds age);
   std::string holder(const RobotId& id) const;                     // of control, now; empty: nobody
   bool is_kept_by(const RobotId& id, const Client& client) const;  // control; or nobody has it
-  boost::asio::awaitable<void> watch_control();                    // reports when control has ended, until cancelled
+  // SAFETY: what acts in the name of an actor who may command no more ends now: experiments and models (StationSink),
+  // control, and commands that wait here or on a robot. A robot that moves in that name is to be brought to rest; so is
+  // one that is away, when it is back.
+  void end_right(const runtime::EndedRight& right);
+  std::set<std::string> acting() const;          // in whose names robots are controlled or moved, or will be
+  boost::asio::awaitable<void> watch_control();  // reports when control has ended, until cancelled
 
   // Whether the reservation may be made: what Reservations::check says. conflict, too: somebody is in control of the
   // robot whom it would keep out within kReservationNotice, and no administrator makes it.

@@ -16,6 +16,7 @@ void StationParts::publish(const Authority::Change& change, const std::string& a
   if (entry == nullptr) return;
   RobotState& robot = entry->robot;
   robot.control = control.of(robot.id);
+  if (!robot.control.holder.empty()) entry->moves_for = robot.control.holder;
   drop_outdated(*entry);
   notifier.note(robot, change.kind, change.cause);
   AuditNote audit;
@@ -25,6 +26,41 @@ void StationParts::publish(const Authority::Change& change, const std::string& a
   audit.detail = control_detail(change.cause, robot.control.holder);
   notifier.publish(audit);
   notifier.publish(robot);
+}
+
+namespace {
+
+// As far as is known: nothing moves it now, and nothing that was sent or waits may. One that is away may move.
+bool is_surely_at_rest(const RobotEntry& entry) {
+  const RobotState& robot = entry.robot;
+  const bool rests =
+      entry.link != nullptr && robot.context.mode == rheonaut_MODE_MANUAL && robot.sample && robot.sample->duty == 0;
+  return rests && entry.orders_ahead().empty() && entry.commands.unanswered.empty() && entry.timed.by.actor.empty() &&
+         !entry.timed.is_of_earlier_run;
+}
+
+}  // namespace
+
+// SAFETY: what may move in that name comes to rest. A robot that surely rests is left alone.
+void StationParts::end_right(RobotEntry& entry, const runtime::EndedRight& right) {
+  const bool is_at_rest = is_surely_at_rest(entry);  // before what waits is dropped
+  timed.withdraw_queued(entry, "control_ended",
+                        [&right](const PendingCommand& pending) { return right.is_of(pending.record.actor); });
+  const ControlState before = entry.robot.control;
+  const auto change = control.end_right(entry.robot.id, right);
+  if (change) publish(*change, "station", "");
+  entry.robot.control = control.of(entry.robot.id);
+  if (!change && entry.robot.control != before) notifier.publish(entry.robot);  // a request for it
+  if (entry.moves_for.empty() || !right.is_of(entry.moves_for)) return;
+  if (!is_at_rest && !entry.robot.latched()) notifier.publish_rest_owed(entry.robot, right);
+  entry.moves_for.clear();
+}
+
+void StationParts::add_acting(const RobotEntry& entry, std::set<std::string>& actors) const {
+  const ControlState now = control.of(entry.robot.id);
+  for (const std::string& actor : {now.holder, now.requested_by, entry.moves_for, entry.timed.by.actor}) {
+    if (!actor.empty()) actors.insert(actor);
+  }
 }
 
 void StationParts::end_control() {

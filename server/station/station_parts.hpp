@@ -6,6 +6,7 @@
 #include <boost/asio/io_context.hpp>
 #include <cstdint>
 #include <functional>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -32,6 +33,10 @@ struct StationParts {
 
   // A change of control has been decided: what it ends is dropped, and everybody is notified.
   void publish(const Authority::Change& change, const std::string& actor, const std::string& peer);
+  // What the robot does, or is about to do, in the name of somebody whose right has ended.
+  void end_right(RobotEntry& entry, const runtime::EndedRight& right);
+  // Adds those in whose names that is.
+  void add_acting(const RobotEntry& entry, std::set<std::string>& actors) const;
   // Publishes the ends of control that time or a reservation has brought.
   void end_control();
   // Publishes the robots whose running reservation is another one than was shown last.

@@ -131,10 +131,10 @@ class ExperimentTest : public SystemTest {
     tasks.spawn("work before it", wait_at_gate());
     tasks.spawn("a request", request(std::move(document)));
   }
-  void let_worker_go() {
+  void let_worker_go(bool is_accepted = true) {
     EXPECT_FALSE(answered) << "its profile waits to be read";
     gate_.set_value();
-    EXPECT_TRUE(clock.run_until([&] { return answered && *answered; }, 5s));
+    EXPECT_TRUE(clock.run_until([&] { return answered && answered->has_value() == is_accepted; }, 5s));
   }
   std::optional<Result<server::experiments::ExperimentView>> answered;  // that request
 

@@ -34,6 +34,7 @@ asio::awaitable<Result<storage::Job>> begin_job(FitParts parts, storage::JobRequ
                                                 FitRequest request, std::int64_t ends_us) {
   for (;;) {
     auto copy = wanted;
+    copy.owner = request.actor();
     auto begun = co_await parts.jobs.begin(std::move(copy), work);
     const bool may_wait = request.is_wanted() && parts.clock.steady_us() < ends_us;
     if (begun || !may_wait) co_return begun;
@@ -48,12 +49,18 @@ asio::awaitable<Result<FittedModel>> fit(FitParts parts, FitRequest request) {
   auto work = [&analysis = parts.analysis, identify = std::move(identify)](storage::JobRun& job) {
     return analysis::identify_job(analysis, identify, std::nullopt, job);
   };
-  storage::JobRequest wanted{body->kind, body->document, request.actor};
+  const storage::JobRequest wanted{body->kind, body->document, {}};
   const std::int64_t ends_us = parts.clock.steady_us() + kFitWithin.count();
-  const auto begun = co_await begin_job(parts, std::move(wanted), std::move(work), request, ends_us);
-  if (!begun) co_return std::unexpected{begun.error()};
-  const auto ended = co_await await_job(parts, begun->id, std::move(request), ends_us);
-  if (!ended) co_return std::unexpected{ended.error()};
+  Result<storage::Job> ended = std::unexpected{Error{}};
+  for (bool is_of_another = true; is_of_another;) {
+    const auto begun = co_await begin_job(parts, wanted, work, request, ends_us);
+    if (!begun) co_return std::unexpected{begun.error()};
+    ended = co_await await_job(parts, begun->id, request, ends_us);
+    if (!ended) co_return std::unexpected{ended.error()};
+    // The experiment has come into other hands, and the right of who had it before has ended.
+    is_of_another =
+        ended->state == storage::JobState::cancelled && request.is_wanted() && ended->request.owner != request.actor();
+  }
   if (ended->state != storage::JobState::done) {
     const std::string why = ended->error.empty() ? text(ended->state) : ended->error;
     co_return fail(ErrorCode::conflict, fmt::format("the fit, job {}: {}", ended->id, why), "fit_failed");

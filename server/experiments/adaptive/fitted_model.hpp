@@ -37,7 +37,7 @@ nlohmann::json to_json(const FittedModel& fitted);
 struct FitRequest {
   std::vector<storage::RunId> runs;
   bool is_fractional = true;                              // else the structure is chosen
-  std::string actor;                                      // in whose name
+  std::function<std::string()> actor;                     // in whose name now
   std::function<bool()> is_wanted = [] { return true; };  // false: it ends soon
 };
 

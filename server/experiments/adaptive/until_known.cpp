@@ -52,7 +52,8 @@ std::string forbidden_in_words(const NextExcitation& found) {
 
 }  // namespace
 
-asio::awaitable<Result<std::optional<Variant>>> UntilKnown::next(std::vector<storage::RunId> runs, std::string actor,
+asio::awaitable<Result<std::optional<Variant>>> UntilKnown::next(std::vector<storage::RunId> runs,
+                                                                 std::function<std::string()> actor,
                                                                  control::FractionalModel in_use,
                                                                  std::function<bool()> is_wanted) {
   Known known;

@@ -29,7 +29,8 @@ class UntilKnown {
       : profile_{profile}, fit_{fit}, maths_{maths} {}
 
   // The runs so far, as they were recorded; `in_use`: the model before there is a fit. An error: why it cannot go on.
-  boost::asio::awaitable<Result<std::optional<Variant>>> next(std::vector<storage::RunId> runs, std::string actor,
+  boost::asio::awaitable<Result<std::optional<Variant>>> next(std::vector<storage::RunId> runs,
+                                                              std::function<std::string()> actor,
                                                               control::FractionalModel in_use,
                                                               std::function<bool()> is_wanted);
 

@@ -73,7 +73,8 @@ asio::awaitable<std::optional<Variant>> Conduct::next_run() {
   for (const storage::ExperimentRun& run : begun_) runs.push_back(run.run.value_or(0));
   if (!runs.empty()) activity_ = fmt::format("fitting a model to {} of its runs", runs.size());
   auto is_wanted = [this] { return !abort_.has_value(); };
-  auto next = co_await until_->next(std::move(runs), experiment_.acts_for, model_in_use().model, std::move(is_wanted));
+  std::function<std::string()> actor = [this] { return experiment_.acts_for; };
+  auto next = co_await until_->next(std::move(runs), std::move(actor), model_in_use().model, std::move(is_wanted));
   activity_.clear();
   if (!begun_.empty() && !until_->knowledge().is_null()) {
     current().knowledge = until_->knowledge().dump();

@@ -28,6 +28,7 @@ namespace server::experiments {
 
 inline constexpr microseconds kFluidWithin{3'600'000'000};  // for a person to change it, or to set the pump
 inline constexpr const char* kOtherController = "other_controller";
+inline constexpr const char* kRightEnded = "right_ended";  // of who it acts for
 
 // The controller of a name that a profile mentions, for this robot. Errors say what is wrong with the name.
 using ControllerByName =

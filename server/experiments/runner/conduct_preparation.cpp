@@ -178,6 +178,7 @@ asio::awaitable<std::uint64_t> Conduct::submit(const char* what, protocol::Comma
 
 asio::awaitable<void> Conduct::send_controller(std::string name) {
   const auto controller = co_await parts_.controller_by_name(name, experiment_.request.robot_id);
+  if (abort_) co_return;  // SAFETY: what was decided meanwhile holds: nothing is sent any more
   if (!controller) {
     abort({"controller", fmt::format("controller '{}': {}", name, controller.error().detail)});
     co_return;

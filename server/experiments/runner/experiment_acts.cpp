@@ -6,7 +6,6 @@
 #include "server/experiments/profile_document.hpp"
 #include "server/experiments/runner/experiments.hpp"
 #include "server/experiments/runner/limits_check.hpp"
-#include "server/runtime/counted.hpp"
 #include "server/runtime/exceptions.hpp"
 #include "server/station/state/audit_note.hpp"
 #include "server/storage/experiments/experiment_store.hpp"
@@ -71,14 +70,14 @@ Result<void> Experiments::check_request(const storage::ExperimentRequest& reques
                 "unattended_not_allowed");
   }
   if (!is_loaded_) return fail(ErrorCode::unavailable, "the station is just starting; try again", "starting");
-  if (entries_.size() + static_cast<std::size_t>(being_added_) < kMostQueued) return {};
+  if (entries_.size() + being_added_.size() < kMostQueued) return {};
   return fail(ErrorCode::unavailable, fmt::format("{} experiments wait already", kMostQueued), "too_many_experiments");
 }
 
 asio::awaitable<Result<ExperimentView>> Experiments::begin(storage::ExperimentRequest request, station::Author by,
                                                            std::optional<std::int64_t> seen_at_us) {
   if (auto allowed = check_request(request); !allowed) co_return std::unexpected{allowed.error()};
-  const runtime::Counted one_more{being_added_};
+  const runtime::RequestsOnTheirWay::Request one_more{being_added_, by.actor};
   const station::RobotId robot_id = request.robot_id;
   const std::uint64_t holds_before = holds_[robot_id].count;
   auto job = [document = request.profile, envelope = parts_.station.envelope(),
@@ -129,6 +128,13 @@ asio::awaitable<Result<ExperimentView>> Experiments::begin(storage::ExperimentRe
       holds_before) {  // SAFETY: a stop, or an abort, while it was being stored holds it as well
     kept.experiment.is_held = kept.is_changed = true;
     kept.experiment.reason = holds_[robot_id].reason;
+  }
+  // SAFETY: a right that ended while it was being stored ends it as it ends one that waits.
+  if (!one_more.ended().empty()) {
+    note = note_of(kept, "cancelled", {kStationActor, "", parts_.clock.utc_us()});
+    Experiment ended = take_out(id, kRightEnded, one_more.ended());
+    co_await store_end(std::move(ended), std::move(note));
+    co_return fail(ErrorCode::forbidden, one_more.ended(), "not_permitted");
   }
   const WaitReason waits = wait_reason_of(kept);
   kept.waits_for = waits.reason;
@@ -320,18 +326,9 @@ asio::awaitable<Result<ExperimentView>> Experiments::abort(ExperimentId id, std:
   if (running_.contains(entry.experiment.request.robot_id) && running_[entry.experiment.request.robot_id] == id) {
     co_return fail(ErrorCode::conflict, "it is just about to begin; try again", "wrong_state");
   }
-  Experiment ended = entry.experiment;
-  ended.state = ExperimentState::cancelled;
-  ended.reason = "requested";
-  ended.detail = detail;
-  ended.ended_at_us = by.at_us;
   const station::AuditNote note = note_of(entry, "cancelled", by);
-  entries_.erase(id);
-  auto store = [ended, note](storage::Database& database) { storage::store_experiment(database, ended, note); };
-  co_await writer_.keep("the end of an experiment", std::move(store));
-  on_change_({ended, "", "", std::nullopt});
-  changed_.notify();
-  wake_.notify();
+  Experiment ended = take_out(id, "requested", detail);
+  co_await store_end(std::move(ended), note);
   co_return co_await find(id);
 }
 

@@ -43,6 +43,7 @@ Experiments::Experiments(const DriverParts& parts, storage::RecordingParts& reco
       maths_{maths},
       allow_unattended_{allow_unattended},
       writer_{parts.loop, parts.clock, recording.recorder},
+      rests_{parts.clock, parts.tasks, parts.station, writer_},
       wake_{parts.loop},
       changed_{parts.loop} {
   parts.station.add_sink(*this);
@@ -54,7 +55,6 @@ asio::awaitable<void> Experiments::run() {
   co_await load();
   std::int64_t published_us = 0;
   for (;;) {
-    put_interrupted_to_rest();
     for (const auto& [robot, id] : running_) abort_if_reserved(robot);
     hold_what_is_left_alone();
     begin_what_may();
@@ -199,6 +199,7 @@ asio::awaitable<void> Experiments::carry_out(ExperimentId id) {
   entry.experiment.state = ExperimentState::running;
   entry.experiment.reason.clear();
   entry.conduct = std::make_unique<Conduct>(conduct_parts, entry.experiment, entry.profile, entry.life);
+  if (entry.end) end_in_nobodys_name(entry, *entry.end);
   const std::string name = fmt::format("experiment {}", id);
   co_await runtime::contained(parts_.tasks.exceptions(), parts_.clock, runtime::Ended::experiment, name,
                               conduct(entry));
@@ -229,14 +230,14 @@ asio::awaitable<void> Experiments::finish(Entry& entry) {
   experiment.reason = entry.end ? entry.end->reason : conclusion ? conclusion->reason : "";
   experiment.detail = entry.end ? entry.end->detail : conclusion ? conclusion->detail : "";
   experiment.ended_at_us = parts_.clock.utc_us();
-  const station::Author by{experiment.acts_for, fmt::format("experiment:{}", experiment.id), *experiment.ended_at_us};
+  const std::string actor = experiment.reason == kRightEnded ? kStationActor : experiment.acts_for;
+  const station::Author by{actor, fmt::format("experiment:{}", experiment.id), *experiment.ended_at_us};
   // Its control was taken for longer than a sign of life lasts; who commands the robot by now keeps it.
-  const bool is_kept = parts_.station.is_kept_by(experiment.request.robot_id, {experiment.acts_for, experiment.client});
+  const station::RobotId& of_robot = experiment.request.robot_id;
+  const bool is_kept = parts_.station.holder(of_robot) == experiment.acts_for &&
+                       parts_.station.is_kept_by(of_robot, {experiment.acts_for, experiment.client});
   if (experiment.request.is_unattended && experiment.reason != "operator_command" && is_kept) {
-    station::ControlRequest release;
-    release.robot_id = experiment.request.robot_id;
-    release.actor = experiment.acts_for;
-    release.peer = by.peer;
+    station::ControlRequest release{.robot_id = of_robot, .actor = actor, .peer = by.peer, .reason = {}};
     release.action = station::ControlAction::release;
     static_cast<void>(parts_.station.control(release));
   }

@@ -19,6 +19,7 @@
 #include <vector>
 
 #include "server/experiments/runner/conduct.hpp"
+#include "server/runtime/ended_right.hpp"
 #include "server/runtime/result.hpp"
 #include "server/storage/recording_parts.hpp"
 
@@ -92,11 +93,14 @@ class Experiments final : public station::StationSink {
   // Without its runs; none: it is not known, or has ended.
   std::optional<ExperimentView> summary(storage::ExperimentId id) const;
 
+  std::set<std::string> acting() const;  // in whose names experiments run or wait
+
   void on_samples(const station::RobotState& robot, const station::SampleBatch& batch) override;
   void on_robot(const station::RobotState& robot) override;
   void on_command(const station::CommandRecord& record) override;
   void on_event(const station::RobotState& robot, const station::RobotEvent& event) override;
   void on_stop_again(const station::CommandRecord& in_force) override;
+  void on_right_ended(const runtime::EndedRight& right) override;
   bool watches(const station::RobotId& robot_id) const override { return running_.contains(robot_id); }
 
  private:
@@ -106,7 +110,7 @@ class Experiments final : public station::StationSink {
     Life life;
     std::string waits_for, waits_for_detail;
     std::unique_ptr<Conduct> conduct;  // null: it waits
-    std::optional<Abort> end;          // of a conduct that has ended
+    std::optional<Abort> end;          // of a conduct that has ended, or is not to begin
     bool has_ended = false;
     bool is_unreadable = false;  // its profile is of another version
     bool is_changed = false;     // and the database does not know it yet
@@ -140,16 +144,17 @@ class Experiments final : public station::StationSink {
   boost::asio::awaitable<void> hold_queue(station::RobotId robot_id);
   boost::asio::awaitable<void> keep_if_it_can_be(std::string what, std::function<void(storage::Database&)> change);
   boost::asio::awaitable<void> store_states(std::vector<storage::Experiment> changed);
-  boost::asio::awaitable<void> settle_rest(station::RobotId robot_id);
   void hold_after_stop(const station::RobotId& robot_id);
   std::vector<storage::Experiment> hold_all(const station::RobotId& robot_id, const char* reason);
   void note_states();
   void spawn(const std::string& name, boost::asio::awaitable<void> task);
   void begin_what_may();
   void hold_what_is_left_alone();
+  static void end_in_nobodys_name(Entry& entry, Abort why);
+  storage::Experiment take_out(storage::ExperimentId id, std::string reason, std::string detail);
+  boost::asio::awaitable<void> store_end(storage::Experiment ended, station::AuditNote note);
   void put_into_hands_of(Entry& entry, const station::Client& client, std::optional<std::int64_t> seen_at_us);
   Result<void> take_control_for(const Entry& entry, const station::Client& client, const std::string& peer);
-  void put_interrupted_to_rest();
   WaitReason wait_reason_of(const Entry& entry) const;
   WaitReason reserved_for_another(const storage::Experiment& experiment) const;  // empty: it is not, or not that soon
   void abort_if_reserved(const station::RobotId& robot_id);
@@ -177,11 +182,10 @@ class Experiments final : public station::StationSink {
   std::map<station::RobotId, storage::ExperimentId> running_;  // of each robot at most one
   std::map<station::RobotId, Hold> holds_;                     // of all that waited for a robot
   std::map<station::RobotId, std::int64_t> commanded_at_us_;   // steady, when a person last commanded a robot
-  std::set<station::RobotId> resting_;                         // of to_rest_: somebody is at it
+  RestsOwed rests_;
   bool is_storing_ = false;
-  std::set<station::RobotId> to_rest_;  // whose experiment was interrupted: what they do is ended when they are back
   bool is_loaded_ = false;
-  int being_added_ = 0;
+  runtime::RequestsOnTheirWay being_added_;
   runtime::Signal wake_;
   runtime::Signal changed_;
 };

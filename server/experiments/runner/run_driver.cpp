@@ -8,7 +8,6 @@
 #include <utility>
 
 #include "server/experiments/runner/order_arguments.hpp"
-#include "server/runtime/counted.hpp"
 #include "server/station/commands/pending_command.hpp"
 
 namespace server::experiments {

@@ -171,6 +171,19 @@ void Authority::keep_all_alive(const Client& client) {
   for (auto& [robot, lease] : leases_) extend(robot, lease, client);
 }
 
+std::optional<Authority::Change> Authority::end_right(const RobotId& robot, const runtime::EndedRight& right) {
+  Lease* lease = lease_of(robot);
+  if (lease == nullptr) return std::nullopt;
+  if (right.is_of(lease->requested_by.actor)) {
+    lease->requested_by = {};
+    lease->request_ends_us = 0;
+  }
+  if (!right.is_of(lease->holder)) return std::nullopt;
+  Change change{robot, "control_ended_with_right", fmt::format("of {}: {}", lease->holder, right.why)};
+  leases_.erase(robot);
+  return change;
+}
+
 std::vector<Authority::Change> Authority::expire() {
   std::vector<Change> changes;
   std::erase_if(leases_, [&](const auto& entry) {

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "server/runtime/clock.hpp"
+#include "server/runtime/ended_right.hpp"
 #include "server/runtime/result.hpp"
 #include "server/station/commands/client.hpp"
 #include "server/station/commands/requests.hpp"
@@ -69,6 +70,9 @@ class Authority {
   void keep_alive(const RobotId& robot, const Client& client);
   // Every lease that the client keeps: of one that says no robot, and has no id.
   void keep_all_alive(const Client& client);
+
+  // What an actor whose right has ended holds, or has asked for, ends. None: they held nothing.
+  std::optional<Change> end_right(const RobotId& robot, const runtime::EndedRight& right);
 
   // Ends what has ended, and returns it.
   std::vector<Change> expire();

@@ -19,6 +19,7 @@ using namespace std::chrono_literals;
 namespace {
 
 constexpr microseconds kDebtInterval = 1s;
+const Author kOfTheStation{"station:model", "", 0};
 
 bool is_confirmed(std::uint32_t flags) { return (flags & rheonaut_TELEMETRY_FLAG_MODEL_CONFIRMED) != 0; }
 
@@ -176,6 +177,19 @@ void ModelSender::on_in_force(const RobotState& robot, const InForceRecord& reco
   look_again(robot.id);
 }
 
+// SAFETY: a model that is on its way in nobody's name any more is taken back; what is owed, the station owes from now.
+void ModelSender::on_right_ended(const runtime::EndedRight& right) {
+  for (auto& [id, entry] : entries_) {
+    if (!right.is_of(entry.naming.by.actor)) continue;
+    entry.naming.by = kOfTheStation;
+    if (!entry.is_at_work) continue;
+    ++entry.naming.number;  // the exchange ends, and its task goes on with this
+    entry.owes = entry.owes || entry.naming.model.has_value();
+    entry.naming.model.reset();
+    open_.insert(id);
+  }
+}
+
 void ModelSender::look_again(const RobotId& id) {
   changed_.insert(id);
   wake_.notify();
@@ -237,7 +251,7 @@ void ModelSender::follow_confirmation(const RobotState& robot, Entry& entry) {
     entry.naming.boot_id = robot.boot_id;
     station_.set_model(robot.id, model_confirmed_by_command());
   } else if (finding == Finding::of_unknown_origin) {
-    entry.naming = {entry.naming.number + 1, {"station:model", "", 0}, robot.boot_id, robot.fluid, std::nullopt};
+    entry.naming = {entry.naming.number + 1, kOfTheStation, robot.boot_id, robot.fluid, std::nullopt};
     entry.owes = true;
     entry.next_try_us = 0;
     station_.set_model(robot.id, model_to_be_taken_back());

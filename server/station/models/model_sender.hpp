@@ -46,6 +46,7 @@ class ModelSender final : public StationSink {
   void on_robot(const RobotState& robot) override;
   void on_samples(const RobotState& robot, const SampleBatch& batch) override;
   void on_in_force(const RobotState& robot, const InForceRecord& record) override;
+  void on_right_ended(const runtime::EndedRight& right) override;
 
  private:
   class StationRobot;

@@ -43,6 +43,7 @@ struct RestoredRobot {
   std::uint64_t emergency_id = 0;  // the latch it was last known to be in; 0: none
   std::int64_t retired_at_us = 0;  // UTC; 0: in use
   std::string fluid = {};          // that was named last; empty: none
+  std::string moves_for = {};      // whose command moved that boot last; empty: nobody's
 };
 
 class RobotArchive {

@@ -3,6 +3,7 @@
 // Called on the loop's thread. A sink returns at once, copies what it keeps, and never calls the station from inside.
 #pragma once
 
+#include "server/runtime/ended_right.hpp"
 #include "server/station/state/audit_note.hpp"
 #include "server/station/state/station_state.hpp"
 
@@ -28,6 +29,10 @@ class StationSink {
   // An emergency stop was asked for whose answer is one that is under way or in force: there is no new command.
   virtual void on_stop_again(const CommandRecord& in_force) { static_cast<void>(in_force); }
   virtual void on_audit(const AuditNote&) {}
+  // Somebody's right to command has ended: whatever acts in their name ends.
+  virtual void on_right_ended(const runtime::EndedRight&) {}
+  // The robot moves, or may, in a name whose right to command has ended: it is to be brought to rest in nobody's.
+  virtual void on_rest_owed(const RobotState&, const runtime::EndedRight&) {}
   virtual void on_clock(const RobotState&, const ClockRecord&) {}
   virtual void on_in_force(const RobotState&, const InForceRecord&) {}
 

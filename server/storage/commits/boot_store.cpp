@@ -71,9 +71,23 @@ std::vector<station::RestoredRobot> BootStore::robots() {
                       .boot_id = unsigned_id(query.getColumn(1)),
                       .emergency_id = latch_of(robot_id),
                       .retired_at_us = query.getColumn(2).getInt64(),
-                      .fluid = query.getColumn(3).getString()});
+                      .fluid = query.getColumn(3).getString(),
+                      .moves_for = mover_of(robot_id, unsigned_id(query.getColumn(1)))});
   }
   return robots;
+}
+
+// SAFETY: whose right must hold while it goes on doing what it was told; by a stop, or by the station, to rest.
+std::string BootStore::mover_of(const station::RobotId& robot_id, station::BootId boot_id) {
+  constexpr std::int64_t kLatest = 10'000;  // commands that are looked at
+  SQLite::Statement last{database_.handle(),
+                         "SELECT actor FROM (SELECT actor, boot_id, kind, submitted_at_us FROM command"
+                         " WHERE robot_id = ? AND (sent_at_us > 0 OR kind = 'emergency_stop') ORDER BY submitted_at_us "
+                         "DESC LIMIT ?) WHERE boot_id = ? AND kind IN"
+                         " ('set_mode', 'set_setpoint', 'set_duty', 'set_duty_schedule', 'emergency_stop')"
+                         " ORDER BY submitted_at_us DESC LIMIT 1"};
+  bind_all(last, robot_id, kLatest, boot_id);
+  return last.executeStep() ? last.getColumn(0).getString() : "";
 }
 
 // SAFETY: a boot that has connected and of which nothing is stored yet does not count: then the boot before it decides.

@@ -112,6 +112,7 @@ class BootStore {
                                                const config::LoopbackEnrolment& enrolment);
   void note_enrolled(const station::AdmissionRequest& request);
   std::uint64_t latch_of(const station::RobotId& robot_id);
+  std::string mover_of(const station::RobotId& robot_id, station::BootId boot_id);
   std::optional<std::uint64_t> last_emergency(std::int64_t boot_key);  // empty: nothing of it is stored
   StoredBoot load(std::int64_t boot_key);
   void end(std::int64_t boot_key, std::int64_t noticed_at_us);

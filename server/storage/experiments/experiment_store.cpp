@@ -144,7 +144,7 @@ void note_knowledge(Database& database, ExperimentId id, const ExperimentRun& ru
   execute(note, run.knowledge, id, run.number);
 }
 
-std::vector<station::RobotId> interrupt_experiments(Database& database, std::int64_t utc_us) {
+std::vector<OwedRest> interrupt_experiments(Database& database, std::int64_t utc_us) {
   SQLite::Database& handle = database.handle();
   SQLite::Transaction transaction{handle, SQLite::TransactionBehavior::IMMEDIATE};
   SQLite::Statement runs{handle,
@@ -159,18 +159,37 @@ std::vector<station::RobotId> interrupt_experiments(Database& database, std::int
   SQLite::Statement hold{handle,
                          "UPDATE experiment SET held = 1, reason = 'station_restarted' WHERE state = 'waiting'"};
   hold.exec();
-  std::vector<station::RobotId> robots;
-  SQLite::Statement to_rest{handle, "SELECT DISTINCT robot_id FROM experiment WHERE needs_rest = 1"};
-  while (to_rest.executeStep()) robots.push_back(to_rest.getColumn(0).getString());
-  to_rest.reset();
+  std::vector<OwedRest> owed = owed_rests(database);
   transaction.commit();
-  return robots;
+  return owed;
+}
+
+std::vector<OwedRest> owed_rests(Database& database) {
+  std::vector<OwedRest> owed;
+  SQLite::Statement to_rest{database.handle(),
+                            "SELECT DISTINCT robot_id, 0, 'its experiment was interrupted' FROM experiment"
+                            " WHERE needs_rest = 1 UNION ALL SELECT robot_id, boot_id, why FROM rest_owed"};
+  while (to_rest.executeStep()) {
+    owed.push_back(
+        {to_rest.getColumn(0).getString(), unsigned_id(to_rest.getColumn(1)), to_rest.getColumn(2).getString()});
+  }
+  return owed;
+}
+
+void owe_rest(Database& database, const OwedRest& owed, std::int64_t utc_us) {
+  SQLite::Statement owe{database.handle(),
+                        "INSERT OR REPLACE INTO rest_owed (robot_id, boot_id, why, since_us) VALUES (?, ?, ?, ?)"};
+  execute(owe, owed.robot_id, owed.boot_id, owed.why, utc_us);
 }
 
 void note_rest(Database& database, const station::RobotId& robot_id) {
-  SQLite::Statement seen{database.handle(),
-                         "UPDATE experiment SET needs_rest = 0 WHERE robot_id = ? AND needs_rest = 1"};
-  execute(seen, robot_id);
+  SQLite::Transaction transaction{database.handle(), SQLite::TransactionBehavior::IMMEDIATE};
+  for (const char* sql : {"UPDATE experiment SET needs_rest = 0 WHERE robot_id = ? AND needs_rest = 1",
+                          "DELETE FROM rest_owed WHERE robot_id = ?"}) {
+    SQLite::Statement seen{database.handle(), sql};
+    execute(seen, robot_id);
+  }
+  transaction.commit();
 }
 
 std::optional<Experiment> find_experiment(SQLite::Database& database, ExperimentId id) {

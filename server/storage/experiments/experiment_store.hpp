@@ -28,12 +28,21 @@ void add_experiment_run(Database& database, ExperimentId id, const ExperimentRun
 void end_experiment_run(Database& database, ExperimentId id, const ExperimentRun& run);
 void note_knowledge(Database& database, ExperimentId id, const ExperimentRun& run);  // its knowledge
 
-// SAFETY: after a restart of the station nothing goes on by itself: what had begun is interrupted, what waited is held.
-// Returns the robots whose experiment was interrupted, by this restart or an earlier one, and that have not been seen
-// at rest since.
-std::vector<station::RobotId> interrupt_experiments(Database& database, std::int64_t utc_us);
+// A robot that is to be brought to rest in nobody's name, and was not seen at rest since.
+struct OwedRest {
+  station::RobotId robot_id;
+  station::BootId boot_id = 0;  // that moves; 0: whichever
+  std::string why;              // for people
+};
 
-void note_rest(Database& database, const station::RobotId& robot_id);  // it was seen at rest
+// SAFETY: after a restart of the station nothing goes on by itself: what had begun is interrupted, what waited is held.
+// Returns the robots that are owed rest: those whose experiment was interrupted, by this restart or an earlier one, and
+// those of owe_rest().
+std::vector<OwedRest> interrupt_experiments(Database& database, std::int64_t utc_us);
+
+std::vector<OwedRest> owed_rests(Database& database);
+void owe_rest(Database& database, const OwedRest& owed, std::int64_t utc_us);
+void note_rest(Database& database, const station::RobotId& robot_id);  // it is owed none any more
 
 std::optional<Experiment> find_experiment(SQLite::Database& database, ExperimentId id);
 // Each with the counts of its runs, and without the runs.

@@ -6,8 +6,8 @@
 // Loop thread.
 #pragma once
 
-#include "server/runtime/counted.hpp"
 #include "server/runtime/result.hpp"
+#include "server/runtime/worker.hpp"
 
 namespace server::storage {
 

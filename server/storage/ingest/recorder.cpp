@@ -7,7 +7,7 @@
 #include <boost/asio/use_awaitable.hpp>
 
 #include "base/version.hpp"
-#include "server/runtime/counted.hpp"
+#include "server/runtime/worker.hpp"
 #include "server/storage/ingest/boot_segments.hpp"
 
 namespace server::storage {

@@ -5,8 +5,8 @@
 #include <deque>
 #include <nlohmann/json.hpp>
 
-#include "server/runtime/counted.hpp"
 #include "server/runtime/exceptions.hpp"
+#include "server/runtime/worker.hpp"
 #include "server/storage/ingest/boot_segments.hpp"
 #include "server/storage/ingest/recorder.hpp"
 

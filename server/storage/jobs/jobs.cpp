@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <boost/asio/experimental/awaitable_operators.hpp>
 
-#include "server/runtime/counted.hpp"
 #include "server/runtime/exceptions.hpp"
 
 namespace server::storage {
@@ -32,7 +31,7 @@ asio::awaitable<void> Jobs::load() {
 }
 
 asio::awaitable<Result<Job>> Jobs::begin(JobRequest request, JobWork work) {
-  if (waiting_.size() + static_cast<std::size_t>(being_added_) >= kMaxWaitingJobs) {
+  if (waiting_.size() + being_added_.size() >= kMaxWaitingJobs) {
     co_return fail(ErrorCode::unavailable,
                    fmt::format("{} jobs wait already; try again when one has ended, or cancel one", kMaxWaitingJobs),
                    "too_many_jobs");
@@ -48,18 +47,22 @@ asio::awaitable<Result<Job>> Jobs::begin(JobRequest request, JobWork work) {
       return runtime::text_of(error);
     }
   };
-  const runtime::Counted one_more{being_added_};
+  const runtime::RequestsOnTheirWay::Request one_more{being_added_, job.request.owner};
   const std::string problem = co_await recorder_.on_disk(std::move(add));
   if (!problem.empty()) {
     co_return fail(ErrorCode::unavailable, fmt::format("the job could not be stored: {}; try again", problem),
                    "not_stored");
   }
-  waiting_.push_back({job.id, std::move(work)});
+  if (!one_more.ended().empty()) {
+    take_out(job.id);
+    co_return fail(ErrorCode::forbidden, one_more.ended(), "not_permitted");
+  }
+  waiting_.push_back({job.id, job.request.owner, std::move(work)});
   wanted_.notify();
   co_return job;
 }
 
-asio::awaitable<void> Jobs::run() { co_await (run_each() || cancel_at_the_end()); }
+asio::awaitable<void> Jobs::run() { co_await (run_each() || store_taken_out() || cancel_at_the_end()); }
 
 asio::awaitable<void> Jobs::run_each() {
   for (;;) {
@@ -94,6 +97,7 @@ asio::awaitable<void> Jobs::run_one(Waiting job) {
   };
   running_ = std::make_unique<JobRun>(job.id, loop_, worker_);
   running_id_ = job.id;
+  running_owner_ = job.owner;
   const Running running{*this};
   auto start = [id = job.id, utc_us = clock_.utc_us()](SQLite::Database& database) { start_job(database, id, utc_us); };
   co_await store(std::move(start));
@@ -156,12 +160,45 @@ asio::awaitable<Result<Job>> Jobs::cancel(JobId id) {
     co_return fail(ErrorCode::conflict, fmt::format("job {} has ended: {}", id, text(known->state)), "has_ended");
   }
   waiting_.erase(at);
+  co_await store_cancelled(id);
+  co_return co_await find(id);
+}
+
+asio::awaitable<void> Jobs::store_cancelled(JobId id) {
   auto finish = [id, utc_us = clock_.utc_us()](SQLite::Database& database) {
     end_job(database, id, {JobState::cancelled, {}, {}}, utc_us);
   };
   co_await store(std::move(finish));
   ended_.notify();
-  co_return co_await find(id);
+}
+
+void Jobs::end_right(const runtime::EndedRight& right) {
+  being_added_.end(right);
+  if (running_ && right.is_of(running_owner_)) running_->cancel();
+  for (const Waiting& job : waiting_) {
+    if (right.is_of(job.owner)) take_out(job.id);
+  }
+  std::erase_if(waiting_, [&right](const Waiting& job) { return right.is_of(job.owner); });
+}
+
+std::set<std::string> Jobs::acting() const {
+  std::set<std::string> owners;
+  if (running_ && !running_->is_cancelled()) owners.insert(running_owner_);
+  for (const Waiting& job : waiting_) owners.insert(job.owner);
+  return owners;
+}
+
+void Jobs::take_out(JobId id) {
+  taken_out_.push_back(id);
+  to_store_.notify();
+}
+
+asio::awaitable<void> Jobs::store_taken_out() {
+  for (;;) {
+    while (taken_out_.empty()) co_await to_store_.wait();
+    co_await store_cancelled(taken_out_.front());
+    taken_out_.pop_front();
+  }
 }
 
 void Jobs::add_progress(Job& job) const {

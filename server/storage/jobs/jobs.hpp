@@ -13,10 +13,12 @@
 #include <deque>
 #include <functional>
 #include <memory>
+#include <set>
 #include <string>
 #include <vector>
 
 #include "server/runtime/clock.hpp"
+#include "server/runtime/ended_right.hpp"
 #include "server/runtime/result.hpp"
 #include "server/runtime/worker.hpp"
 #include "server/storage/database/database_reader.hpp"
@@ -49,6 +51,10 @@ class Jobs {
   // One that waits has ended with this call; a running one ends soon. conflict: it had ended. not_found.
   boost::asio::awaitable<Result<Job>> cancel(JobId id);
 
+  // Those that an actor began who may begin none any more are cancelled; results are kept.
+  void end_right(const runtime::EndedRight& right);
+  std::set<std::string> acting() const;  // whose jobs wait or run
+
   boost::asio::awaitable<Result<Job>> find(JobId id);
   boost::asio::awaitable<std::optional<std::string>> result(JobId id);  // none: it has none
   boost::asio::awaitable<std::vector<Job>> list(JobId before, std::size_t limit);
@@ -62,6 +68,7 @@ class Jobs {
  private:
   struct Waiting {
     JobId id = 0;
+    std::string owner;
     JobWork work;
   };
 
@@ -70,6 +77,9 @@ class Jobs {
   boost::asio::awaitable<JobEnd> end_of(const JobWork& work, JobRun& run);
   boost::asio::awaitable<void> store(std::function<void(SQLite::Database&)> change);
   boost::asio::awaitable<void> cancel_at_the_end();
+  boost::asio::awaitable<void> store_taken_out();
+  boost::asio::awaitable<void> store_cancelled(JobId id);
+  void take_out(JobId id);
   void add_progress(Job& job) const;
 
   boost::asio::io_context& loop_;
@@ -77,11 +87,14 @@ class Jobs {
   Recorder& recorder_;
   DatabaseReader& reader_;
   std::deque<Waiting> waiting_;
-  int being_added_ = 0;
+  runtime::RequestsOnTheirWay being_added_;
+  std::deque<JobId> taken_out_;      // of those that waited: they are cancelled, and the disk does not know it yet
   JobId running_id_ = 0;             // 0: none
   std::unique_ptr<JobRun> running_;  // null: none
-  runtime::Signal wanted_{loop_};    // something waits
+  std::string running_owner_;
+  runtime::Signal wanted_{loop_};  // something waits
   runtime::Signal ended_{loop_};
+  runtime::Signal to_store_{loop_};  // something is in taken_out_
   runtime::WorkerThread worker_{"jobs", 10};
 };
 

@@ -1042,6 +1042,12 @@ CREATE TABLE segment_group (
   extremes BLOB NOT NULL,          -- least and largest value of each channel, binary32, little-endian: docs/database.md
   PRIMARY KEY (boot_key, first_seq)
 ) WITHOUT ROWID;
+CREATE TABLE rest_owed (              -- robots that move in a name whose right has ended, and were not seen at rest since
+  robot_id TEXT PRIMARY KEY REFERENCES robot,
+  boot_id INTEGER NOT NULL,           -- that moves so; a later one is at rest
+  why TEXT NOT NULL,                  -- what has ended the right
+  since_us INTEGER NOT NULL
+) WITHOUT ROWID;
 DELETE FROM sqlite_sequence;
 INSERT INTO sqlite_sequence VALUES('run',7);
 CREATE INDEX boot_by_robot ON boot(robot_id);

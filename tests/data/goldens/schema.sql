@@ -527,3 +527,9 @@ FROM command;
 CREATE INDEX run_span_by_boot ON run_span(boot_key);
 CREATE INDEX run_by_robot ON run(robot_id, started_at_us);
 CREATE INDEX command_stop ON command(boot_id, effect_at_robot_us) WHERE kind = 'emergency_stop';
+CREATE TABLE rest_owed (              -- robots that move in a name whose right has ended, and were not seen at rest since
+  robot_id TEXT PRIMARY KEY REFERENCES robot,
+  boot_id INTEGER NOT NULL,           -- that moves so; a later one is at rest
+  why TEXT NOT NULL,                  -- what has ended the right
+  since_us INTEGER NOT NULL
+) WITHOUT ROWID;

@@ -68,5 +68,43 @@ TEST_F(RestoredLatchTest, RestoresTheLatestBootAndTheLatchItWasIn) {
   EXPECT_EQ(restored().boot_id, 3u);
 }
 
+class RestoredMoverTest : public RecorderFixture {};
+
+TEST_F(RestoredMoverTest, IsWhoseCommandMovedTheLatestBootLast) {
+  std::uint64_t id = 0;
+  const auto record = [this, &id](const char* kind, const std::string& actor, station::BootId boot_id,
+                                  bool was_sent = true) {
+    station::CommandRecord command;
+    command.id = ++id;
+    command.robot_id = robot_.id;
+    command.boot_id = boot_id;
+    command.kind = kind;
+    command.actor = actor;
+    command.state = station::CommandState::acknowledged;
+    command.submitted_at_us = static_cast<std::int64_t>(id);
+    if (was_sent) command.sent_at_us = command.submitted_at_us;
+    recorder_->on_command(command);
+  };
+  const auto mover = [this] {
+    flush();
+    kill();
+    start();
+    return restored_.robots.at(0).moves_for;
+  };
+  start();
+  connect(robot_);
+  EXPECT_EQ(mover(), "");
+  connect(robot_);
+  record("set_duty", "token:first", robot_.boot_id);
+  record("set_mode", "token:ci", robot_.boot_id);
+  record("set_parameter", "token:other", robot_.boot_id);
+  record("set_setpoint", "token:before", robot_.boot_id + 1);
+  record("set_duty", "token:late", robot_.boot_id, false);  // it was too old on arrival
+  EXPECT_EQ(mover(), "token:ci");
+  connect(robot_);
+  record("set_mode", "station:experiments", robot_.boot_id);
+  EXPECT_EQ(mover(), "station:experiments") << "to rest";
+}
+
 }  // namespace
 }  // namespace server

@@ -1,6 +1,13 @@
--- The twelfth migration: how many ticks of a run the robot missed.
+-- The twelfth migration: how many ticks of a run the robot missed, and which robots are owed rest.
 --
--- It adds two columns: no row is rewritten. A digest of an older version has NULL there until the station has counted
--- them from the heads of its segments; what a digest hashes stays.
+-- It adds two columns and a table: no row is rewritten. A digest of an older version has NULL there until the station has
+-- counted them from the heads of its segments; what a digest hashes stays.
 ALTER TABLE run_certificate ADD COLUMN missed_ticks INTEGER;          -- at which the robot made no sample; NULL: not counted
 ALTER TABLE run_certificate ADD COLUMN longest_missed_ticks INTEGER;  -- in a row
+
+CREATE TABLE rest_owed (              -- robots that move in a name whose right has ended, and were not seen at rest since
+  robot_id TEXT PRIMARY KEY REFERENCES robot,
+  boot_id INTEGER NOT NULL,           -- that moves so; a later one is at rest
+  why TEXT NOT NULL,                  -- what has ended the right
+  since_us INTEGER NOT NULL
+) WITHOUT ROWID;

@@ -42,7 +42,8 @@ class UntilKnownTest : public ::testing::Test {
     Result<std::optional<Variant>> result;
     auto ask = [](UntilKnownTest& test, Result<std::optional<Variant>>& into) -> boost::asio::awaitable<void> {
       std::function<bool()> is_wanted = [] { return true; };
-      into = co_await test.until_.next(test.runs_, "anna", control::kNonNewtonianModel, std::move(is_wanted));
+      std::function<std::string()> actor = [] { return "anna"; };
+      into = co_await test.until_.next(test.runs_, std::move(actor), control::kNonNewtonianModel, std::move(is_wanted));
     };
     runtime::run_first(loop_, ask(*this, result));
     if (result && *result) runs_.push_back(static_cast<storage::RunId>(runs_.size()) + 1);
@@ -78,7 +79,7 @@ TEST_F(UntilKnownTest, EndsWhenEnoughIsKnown) {
   ASSERT_TRUE(next().value());
   EXPECT_EQ(asked_.back().runs, (std::vector<storage::RunId>{1}));
   EXPECT_TRUE(asked_.back().is_fractional);
-  EXPECT_EQ(asked_.back().actor, "anna");
+  EXPECT_EQ(asked_.back().actor(), "anna");
   EXPECT_NEAR(until_.knowledge().at("promised_sigma").get<double>(), 0.03 / std::sqrt(2), 1e-4);
   fits_say(0.019);
   EXPECT_FALSE(next().value());

@@ -58,6 +58,7 @@ export const kEnds: Record<string, string> = {
   nobody_present: 'Nobody was there in whose name it acts.',
   control_changed: 'Control of the robot changed hands. Who has it may take this over and resume, within 60 s.',
   control_of_another: 'Somebody else controlled the robot.',
+  right_ended: 'The right to command of whom it acted for has ended: the detail says why.',
   operator_command: 'The person in whose name it acted sent a command of their own. The robot is theirs.',
   unattended_limit: 'Nobody was there for as long as the robot stays in auto by itself.',
   reserved: 'The robot is reserved for somebody else.',
