@@ -24,7 +24,14 @@ std::string route_of(std::string_view method, std::string_view target) {
 template <class Buffers>
 asio::awaitable<bool> AnswerSender::write(const Buffers& buffers) {
   deadline_.allow(kWriteTime);
-  const auto [error, size] = co_await asio::async_write(stream_, buffers, asio::as_tuple(asio::use_awaitable));
+  constexpr std::size_t kAtOnce = 65'536;
+  auto progress = [&slot = slot_, before = std::size_t{0}](const boost::system::error_code& error,
+                                                           std::size_t sent) mutable -> std::size_t {
+    slot.moved(sent - std::exchange(before, sent));
+    return error ? 0 : kAtOnce;
+  };
+  const auto [error, size] =
+      co_await asio::async_write(stream_, buffers, progress, asio::as_tuple(asio::use_awaitable));
   co_return !error;
 }
 

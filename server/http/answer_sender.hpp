@@ -19,6 +19,7 @@
 #include "server/http/http_stream.hpp"
 #include "server/http/request_reading.hpp"
 #include "server/identity/caller.hpp"
+#include "server/net/connection_limiter.hpp"
 #include "server/runtime/exceptions.hpp"
 
 namespace server::http {
@@ -60,8 +61,9 @@ boost::asio::awaitable<std::optional<T>> while_it_stands(std::shared_ptr<identit
 
 class AnswerSender {
  public:
-  AnswerSender(HttpStream& stream, Deadline& deadline, runtime::Clock& clock, runtime::ExceptionLog& exceptions)
-      : stream_{stream}, deadline_{deadline}, clock_{clock}, exceptions_{exceptions} {}
+  AnswerSender(HttpStream& stream, net::ConnectionSlot& slot, Deadline& deadline, runtime::Clock& clock,
+               runtime::ExceptionLog& exceptions)
+      : stream_{stream}, slot_{slot}, deadline_{deadline}, clock_{clock}, exceptions_{exceptions} {}
 
   boost::asio::awaitable<Next> send(Response response, const RequestMessage& to);
 
@@ -72,6 +74,7 @@ class AnswerSender {
   boost::asio::awaitable<bool> write(const Buffers& buffers);
 
   HttpStream& stream_;
+  net::ConnectionSlot& slot_;
   Deadline& deadline_;
   runtime::Clock& clock_;
   runtime::ExceptionLog& exceptions_;

@@ -20,6 +20,13 @@ namespace {
 constexpr microseconds kWatchInterval{std::chrono::seconds{1}};  // how exactly time-outs are kept
 constexpr std::size_t kReadBytes = 4096;
 constexpr std::size_t kMaxDiscardBytes = 1024 * 1024;
+constexpr const char* kHealth = "/healthz";
+
+Response gave_way() {
+  Response response = problem(503, "all connections of the station are taken; ask again in a second", "busy");
+  response.headers.emplace_back("Retry-After", "1");
+  return response;
+}
 
 }  // namespace
 
@@ -35,8 +42,11 @@ HttpConnection::HttpConnection(HttpStream stream, net::ConnectionSlot& slot, tls
       upgrades_{upgrades},
       exceptions_{exceptions},
       deadline_{clock},
-      sender_{stream_, deadline_, clock, exceptions} {
-  slot_.on_end([this] { stream_.end(); });
+      sender_{stream_, slot, deadline_, clock, exceptions} {
+  slot_.on_end([this] {
+    if (is_awaited_) stream_.write_now(last_answer(gave_way(), stream_.is_secure()));
+    stream_.end();
+  });
 }
 
 asio::awaitable<void> HttpConnection::talk() {
@@ -124,6 +134,11 @@ asio::awaitable<Next> HttpConnection::read_and_answer() {
     }
     head = plain_head(parser.get());
     if (router_.is_stop(head.method, head.target)) co_return co_await carry_out_stop(parser, std::move(head));
+    // SAFETY: a place of the reserve is free again at once: nobody lingers there.
+    if (slot_.is_reserve() && head.target.path() != kHealth) {
+      stream_.write_now(last_answer(gave_way(), stream_.is_secure()));
+      co_return Next::end;
+    }
     auto refusal = refusal_of(parser, head);
     if (refusal) co_return co_await send_and_close(std::move(*refusal), parser.release());
   }
@@ -225,12 +240,18 @@ asio::awaitable<Next> HttpConnection::carry_out(Request request, RequestMessage 
   // SAFETY: what changes something, above all a stop, is carried out though its client has hung up.
   if (request.method != "GET" && request.method != "HEAD") {
     Response response = co_await answer(std::move(request));
+    slot_.rest();  // SAFETY: who takes no answer holds no place of others by that
     co_return co_await sender_.send(std::move(response), message);
   }
+  // What is only asked may give its place up: at once while its answer is made, and where the client takes it slowly.
+  if (request.caller.standing != nullptr) slot_.becomes(net::ConnectionSlot::waiting);
   const std::shared_ptr<identity::Standing> standing = request.caller.standing;
   const std::string actor = request.actor;
+  is_awaited_ = true;
   auto response = co_await while_present(stream_, while_it_stands(standing, answer(std::move(request))));
+  is_awaited_ = false;
   if (!response) co_return Next::end;
+  if (standing != nullptr) slot_.becomes(net::ConnectionSlot::sending);
   if (!*response) {
     co_return co_await sender_.send(problem(identity::credential_ended(actor)), message);
   }
@@ -251,6 +272,7 @@ asio::awaitable<Next> HttpConnection::carry_out_stop(RequestParser& parser, Requ
   if (!admitted) co_return co_await send_and_close(std::move(admitted.error()), parser.release());
   admit(request, std::move(*admitted));
   Response response = co_await answer(std::move(request));
+  slot_.rest();
   const bool goes_on = parser.is_done() || can_pass_over_body(parser);
   if (!goes_on) co_return co_await send_and_close(std::move(response), parser.release());
   const Next next = co_await sender_.send(std::move(response), message);
@@ -288,6 +310,7 @@ asio::awaitable<Next> HttpConnection::refuse_unreadable(boost::system::error_cod
 asio::awaitable<Next> HttpConnection::send_and_close(Response response, RequestMessage message) {
   request_has_begun_ = false;
   message.keep_alive(false);
+  slot_.rest();
   co_await sender_.send(std::move(response), message);
   co_await discard_rest();
   co_return Next::end;

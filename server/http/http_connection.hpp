@@ -89,6 +89,7 @@ class HttpConnection {
   Deadline deadline_;
   AnswerSender sender_;
   bool request_has_begun_ = false;
+  bool is_awaited_ = false;                      // the answer to a question is being made, and nothing of it was sent
   std::optional<std::int64_t> unread_since_us_;  // what was read last may have waited so long; empty: it has not
   std::optional<UpgradeRequest> upgrade_;
   const Upgrade* takes_over_ = nullptr;                // not null where there is an upgrade

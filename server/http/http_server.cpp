@@ -39,7 +39,8 @@ HttpServer::HttpServer(runtime::TaskGroup& tasks, runtime::Clock& clock, net::Li
 asio::awaitable<void> HttpServer::run() {
   const runtime::Counted listening{access_.listening};
   auto accepted = [this](tcp::socket socket) { on_connection(HttpStream{std::move(socket)}); };
-  co_await listener_.run(accepted);
+  auto give_up_one = [this] { return access_.limiter.give_up_one(); };
+  co_await listener_.run(accepted, give_up_one);
 }
 
 void HttpServer::on_connection(HttpStream stream) {

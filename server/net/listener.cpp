@@ -19,7 +19,7 @@ using asio::ip::tcp;
 
 namespace {
 
-constexpr std::chrono::milliseconds kPause{50};
+constexpr std::chrono::milliseconds kPause{50}, kTurn{1};
 constexpr rlim_t kDescriptors = 65'536;
 
 // Each connection takes a file descriptor, and the usual soft limit of 1024 is for programs that need few.
@@ -59,13 +59,19 @@ Listener::Listener(asio::io_context& loop, runtime::Clock& clock, const tcp::end
   if (error) refuse(endpoint, error);
 }
 
-asio::awaitable<void> Listener::run(std::function<void(tcp::socket)> on_connection) {
+// SAFETY: a stop that waits to be accepted waits for no pause where another connection can go.
+asio::awaitable<void> Listener::run(std::function<void(tcp::socket)> on_connection, std::function<bool()> give_up_one) {
   for (;;) {
     auto [error, socket] = co_await acceptor_.async_accept(asio::as_tuple(asio::use_awaitable));
     if (error == asio::error::operation_aborted) co_return;
     if (error) {  // out of descriptors, or a peer that left before it was accepted
-      spdlog::warn("accept on {}: {}", config::text(endpoint()), error.message());
-      co_await clock_.sleep_for(kPause);
+      const bool is_without = error == asio::error::no_descriptors;
+      const bool gave_up = is_without && give_up_one();
+      if (const auto unsaid = lines_.next(clock_.steady_us())) {
+        spdlog::warn("accept on {}: {}{}{}", config::text(endpoint()), error.message(),
+                     gave_up ? "; another connection gave its place up" : "", runtime::and_before(*unsaid));
+      }
+      co_await clock_.sleep_for(gave_up ? kTurn : kPause);
       continue;
     }
     on_connection(std::move(socket));

@@ -8,6 +8,7 @@
 #include <functional>
 
 #include "server/runtime/clock.hpp"
+#include "server/runtime/log.hpp"
 
 namespace server::net {
 
@@ -18,13 +19,17 @@ class Listener {
   Listener(boost::asio::io_context& loop, runtime::Clock& clock, const boost::asio::ip::tcp::endpoint& endpoint,
            bool or_any_port = false);
 
-  // Accepts until cancelled; `on_connection` starts a task with the socket and returns at once.
-  boost::asio::awaitable<void> run(std::function<void(boost::asio::ip::tcp::socket)> on_connection);
+  // Accepts until cancelled; `on_connection` starts a task with the socket and returns at once. Without a descriptor
+  // left `give_up_one` is asked to end a connection; false: it cannot, and the port pauses.
+  boost::asio::awaitable<void> run(
+      std::function<void(boost::asio::ip::tcp::socket)> on_connection,
+      std::function<bool()> give_up_one = [] { return false; });
 
   boost::asio::ip::tcp::endpoint endpoint() const { return acceptor_.local_endpoint(); }
 
  private:
   runtime::Clock& clock_;
+  runtime::SparseLines lines_;
   boost::asio::ip::tcp::acceptor acceptor_;
 };
 

@@ -56,11 +56,15 @@ void log_in_force(const tls::TlsCertificate& certificate) {
 
 // Behind one address of this machine there may be many: a proxy, a test, a fleet. A quarter is left for all others.
 ConnectionLimits limits(const config::PortPlaces& places, std::size_t unauthenticated) {
-  return {places.connections, unauthenticated, places.of_address, places.connections - places.connections / 4};
+  return {places.connections, unauthenticated, places.of_address, places.connections - places.connections / 4, 0};
 }
 
 // Of a request it is known at once who makes it, of a robot after its hello.
-ConnectionLimits http_limits(const config::PortPlaces& places) { return limits(places, places.connections); }
+ConnectionLimits http_limits(const config::PortPlaces& places) {
+  ConnectionLimits of_http = limits(places, places.connections);
+  of_http.reserve = 16;
+  return of_http;
+}
 ConnectionLimits robot_limits(const config::PortPlaces& places) {
   return limits(places, std::max(places.connections / 4, 1U));
 }

@@ -8,6 +8,8 @@ measured beside them is the station and not this program.
 """
 import base64
 import contextlib
+import itertools
+import json as json_text
 import os
 import resource
 import selectors
@@ -189,7 +191,33 @@ def silent_pages(http, _robots, token):
                 pages.remove(page)
 
 
-ATTACKS = {attack.__name__: attack for attack in (slowloris, idle, logins, json, frames, silent_pages)}
+def polls(http, _robots, token):
+    """Questions that wait, from two addresses: more than there are places; each that is answered is asked again at once."""
+    with connect(http, "127.0.0.8") as client:
+        client.sendall(post("/api/v1/experiments", b'{"robot_id": "sim-1", "profile": "figure_7"}', token))
+        answer = client.recv(65536).decode()
+        while "\r\n\r\n" not in answer or not answer.rstrip().endswith("}"):
+            answer += client.recv(65536).decode()
+    waiting = json_text.loads(answer.partition("\r\n\r\n")[2])["experiment_id"]
+    question = head("GET", f"/api/v1/experiments/{waiting}?wait_ms=30000", token)
+    sources = itertools.cycle(("127.0.0.8", "127.0.0.9"))
+
+    def dial():
+        client = connect(http, next(sources))
+        client.sendall(question)
+        if has_begun:
+            time.sleep(PAUSE_S)
+        return client
+    has_begun = False
+    crowd = Crowd(400, dial)
+    crowd.fill()
+    has_begun = True
+    say_begun("polls")
+    while True:
+        crowd.replace(PAUSE_S)
+
+
+ATTACKS = {attack.__name__: attack for attack in (slowloris, idle, logins, json, frames, silent_pages, polls)}
 
 
 def main():

@@ -64,7 +64,13 @@ std::string progress_of(const json& job) {
 json wait_for(const JobCommand& options, std::int64_t id) {
   Progress progress{fmt::format("job {}", id), {.is_json = options.json}};
   for (;;) {
-    json job = ask(options, "GET", fmt::format("{}/{}?wait_ms={}", kJobs, id, kLook_ms));
+    StationAnswer answer =
+        StationClient{options.data_dir}.ask("GET", fmt::format("{}/{}?wait_ms={}", kJobs, id, kLook_ms));
+    if (gave_way(answer)) {
+      wait_to_ask_again();
+      continue;
+    }
+    json job = asked(std::move(answer));
     if (!job.at("ended_at_us").is_null()) return job;
     progress.set_detail(fmt::format("{} {}", job.at("state").get<std::string>(), progress_of(job)));
   }

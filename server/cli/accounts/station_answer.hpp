@@ -23,6 +23,14 @@ struct StationAnswer {
   bool is_silent = false;         // without an answer: because the time was over
 };
 
+// The question gave its place to another client; it is asked again a moment later.
+inline bool gave_way(const StationAnswer& answer) {
+  constexpr int kUnavailable = 503;
+  return answer.status == kUnavailable && answer.body.is_object() && answer.body.value("reason", "") == "busy";
+}
+
+inline constexpr std::chrono::milliseconds kAskAgainAfter{1000};  // then
+
 // How long a tool waits for the station.
 struct TimeLimit {
   std::chrono::microseconds time{std::chrono::seconds{30}};

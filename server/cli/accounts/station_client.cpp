@@ -3,12 +3,15 @@
 
 #include <fmt/format.h>
 
+#include <boost/asio/io_context.hpp>
 #include <optional>
 #include <stdexcept>
 
 #include "server/config/data_folder.hpp"
 #include "server/config/endpoint.hpp"
+#include "server/runtime/clock.hpp"
 #include "server/runtime/private_file.hpp"
+#include "server/runtime/tasks.hpp"
 #include "server/storage/query/run_reader.hpp"
 
 namespace server::cli {
@@ -60,6 +63,12 @@ std::string token_of(const std::filesystem::path& file) {
 }
 
 }  // namespace
+
+void wait_to_ask_again(std::chrono::milliseconds time) {
+  boost::asio::io_context loop;
+  runtime::SystemClock clock{loop};
+  runtime::run_first(loop, clock.sleep_for(time));
+}
 
 nlohmann::json asked(StationAnswer answer) {
   constexpr int kFirstSuccess = 200, kFirstRedirection = 300;

@@ -15,6 +15,8 @@ namespace server::cli {
 // The body of an answer that is a success. Throws std::runtime_error saying what the station refused.
 nlohmann::json asked(StationAnswer answer);
 
+void wait_to_ask_again(std::chrono::milliseconds time = kAskAgainAfter);  // of a question that gave_way()
+
 // By which id the station knows this invocation of a tool: what it begins is kept alive by it alone. Random, unless the
 // tool goes on with what an earlier invocation began.
 const std::string& invocation_id();

@@ -283,7 +283,10 @@ json RobotAccess::fit(std::int64_t run_id, std::string& failure) const {
   const Deadline waits{kFitWaitsUs};
   Deadline computes{kFitWithinUs};
   for (;;) {
-    const json job = get(fmt::format("/api/v1/jobs/{}?wait_ms=500", id));
+    const StationAnswer answer = ask("GET", fmt::format("/api/v1/jobs/{}?wait_ms=500", id), nullptr);
+    const bool is_busy = gave_way(answer);
+    if (is_busy) wait_to_ask_again();
+    const json job = is_busy ? json{{"state", "running"}, {"ended_at_us", nullptr}} : asked(answer);
     if (job.at("state") == "done") return job.at("result");
     if (!job.at("ended_at_us").is_null()) {
       failure = text_or(job, "error", "the computation did not end well");

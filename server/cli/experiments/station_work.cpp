@@ -4,9 +4,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <chrono>
 #include <iterator>
 #include <stdexcept>
 #include <string_view>
+#include <utility>
 
 namespace server::cli {
 
@@ -22,10 +24,7 @@ bool has_ended(const json& experiment) {
   return std::ranges::find(kEndedExperiment, state) != std::end(kEndedExperiment);
 }
 
-}  // namespace
-
-json StationWork::checked(const std::string& method, const std::string& target, const json& body) const {
-  StationAnswer answer = ask_(method, target, body);
+json body_of(StationAnswer answer) {
   if (answer.status < kFirstProblem) return std::move(answer.body);
   const json& problem = answer.body;
   const std::string why = problem.is_object() ? problem.value("detail", std::string{}) : std::string{};
@@ -33,11 +32,26 @@ json StationWork::checked(const std::string& method, const std::string& target, 
       fmt::format("the station refused: {}", why.empty() ? fmt::format("status {}", answer.status) : why)};
 }
 
+}  // namespace
+
+json StationWork::checked(const std::string& method, const std::string& target, const json& body) const {
+  return body_of(ask_(method, target, body));
+}
+
+// None: another client needed its place at the station. It waits no longer than a look does, for signs of life go on.
+std::optional<json> StationWork::look_at(const std::string& target) const {
+  StationAnswer answer = ask_("GET", fmt::format("{}?wait_ms={}", target, kLookMs), nullptr);
+  if (!gave_way(answer)) return body_of(std::move(answer));
+  wait_to_ask_again(std::chrono::milliseconds{kLookMs});
+  return std::nullopt;
+}
+
 json StationWork::finished_job(std::int64_t job_id) const {
   for (;;) {
-    json job = get(fmt::format("/api/v1/jobs/{}?wait_ms={}", job_id, kLookMs));
-    on_look_(job);
-    if (!job.at("ended_at_us").is_null()) return job;
+    std::optional<json> job = look_at(fmt::format("/api/v1/jobs/{}", job_id));
+    if (!job) continue;
+    on_look_(*job);
+    if (!job->at("ended_at_us").is_null()) return std::move(*job);
   }
 }
 
@@ -57,11 +71,12 @@ json StationWork::finished_experiment(std::int64_t experiment_id) const {
     const StationAnswer kept = ask_("POST", target + "/keep-alive", seen);
     if (kept.status == 200 && kept.body.contains("stamp_us")) seen["stamp_us"] = kept.body.at("stamp_us");
     const bool is_of_others = kept.status == kTakenOver && kept.body.value("reason", "") == "acts_for_another";
-    json experiment = get(fmt::format("{}?wait_ms={}", target, kLookMs));
-    on_look_(experiment);
-    if (has_ended(experiment)) return experiment;
+    std::optional<json> experiment = look_at(target);
+    if (!experiment) continue;
+    on_look_(*experiment);
+    if (has_ended(*experiment)) return std::move(*experiment);
     // An experiment that waits in other hands may never begin; one that runs there ends by itself.
-    if (is_of_others && experiment.at("state") == "waiting") throw std::runtime_error{kept.body.value("detail", "")};
+    if (is_of_others && experiment->at("state") == "waiting") throw std::runtime_error{kept.body.value("detail", "")};
   }
 }
 

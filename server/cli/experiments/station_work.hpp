@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <functional>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 
 #include "server/cli/accounts/station_client.hpp"
@@ -40,6 +41,7 @@ class StationWork {
 
  private:
   nlohmann::json checked(const std::string& method, const std::string& target, const nlohmann::json& body) const;
+  std::optional<nlohmann::json> look_at(const std::string& target) const;
 
   AskStation ask_;
   OnLook on_look_;

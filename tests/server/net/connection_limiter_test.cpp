@@ -112,6 +112,79 @@ TEST_F(ConnectionLimiterTest, AFullLimiterWithNobodyWhoMayGoRefuses) {
   EXPECT_NE(come("10.0.0.9"), nullptr);
 }
 
+// SAFETY: whoever takes all places by questions that wait, or by answers that they do not take, makes room themselves.
+TEST_F(ConnectionLimiterTest, QuestionsThatWaitAndAnswersThatStandStillGiveWayInTheirOrder) {
+  Visitor* polls = come("10.0.0.1", net::ConnectionSlot::waiting);
+  Visitor* slow = come("10.0.0.1", net::ConnectionSlot::sending);
+  Visitor* polls_too = come("10.0.0.1", net::ConnectionSlot::waiting);
+  for (int i = 2; i < 7; ++i) ASSERT_NE(come("10.0.0." + std::to_string(i), net::ConnectionSlot::busy), nullptr);
+  clock.run_for(std::chrono::seconds{2});
+  EXPECT_NE(come("10.0.0.9", net::ConnectionSlot::busy), nullptr);
+  EXPECT_TRUE(polls->ended && !polls_too->ended && !slow->ended) << "the oldest question";
+  EXPECT_NE(come("10.0.0.9", net::ConnectionSlot::busy), nullptr);
+  EXPECT_TRUE(polls_too->ended && !slow->ended);
+  EXPECT_NE(come("10.0.0.9", net::ConnectionSlot::busy), nullptr);
+  EXPECT_TRUE(slow->ended);
+  EXPECT_EQ(come("10.0.1.1"), nullptr) << "only busy ones are left";
+}
+
+TEST_F(ConnectionLimiterTest, AnAnswerThatMovesStaysAndOfTheOthersTheSlowestGoes) {
+  Visitor* fast = come("10.0.0.1", net::ConnectionSlot::sending);
+  Visitor* slow = come("10.0.0.1", net::ConnectionSlot::sending);
+  Visitor* slower = come("10.0.0.1", net::ConnectionSlot::sending);
+  clock.run_for(std::chrono::seconds{2});
+  fast->slot->moved(net::kSlowAnswer);
+  slow->slot->moved(net::kSlowAnswer / 2);
+  slower->slot->moved(1);
+  EXPECT_NE(come("10.0.0.1", net::ConnectionSlot::busy), nullptr);
+  EXPECT_TRUE(slower->ended && !slow->ended && !fast->ended);
+  EXPECT_NE(come("10.0.0.1", net::ConnectionSlot::busy), nullptr);
+  EXPECT_TRUE(slow->ended);
+  EXPECT_EQ(come("10.0.0.1"), nullptr);
+  clock.run_for(std::chrono::seconds{2});
+  EXPECT_NE(come("10.0.0.1"), nullptr) << "it stands still now";
+  EXPECT_TRUE(fast->ended);
+}
+
+TEST_F(ConnectionLimiterTest, WhoHasMostPlacesLosesOneAndBusyOnesDoNotCount) {
+  for (int i = 0; i < 3; ++i) come("10.0.0.1", net::ConnectionSlot::busy);  // pages of a laboratory
+  Visitor* of_the_lab = come("10.0.0.2", net::ConnectionSlot::waiting);
+  std::vector<Visitor*> of_an_attacker;
+  for (int i = 0; i < 3; ++i) of_an_attacker.push_back(come("10.0.0.3", net::ConnectionSlot::waiting));
+  come("10.0.0.4", net::ConnectionSlot::busy);
+  EXPECT_NE(come("10.0.0.5"), nullptr);
+  EXPECT_TRUE(of_an_attacker[0]->ended);
+  EXPECT_NE(come("10.0.0.5"), nullptr);
+  EXPECT_TRUE(of_an_attacker[1]->ended);
+  EXPECT_FALSE(of_the_lab->ended);
+}
+
+// SAFETY: where nobody can give way, a stop and a look at its health still find a place.
+TEST(ConnectionReserve, IsBeyondTheLimitsAndUnderTheSameRule) {
+  boost::asio::io_context loop;
+  VirtualClock clock{loop};
+  net::ConnectionLimiter limiter{clock, "test port", {2, 2, 2, 2, 2}};
+  std::vector<std::unique_ptr<net::ConnectionSlot>> slots;
+  std::vector<bool> ended(9);
+  const auto come = [&](const char* address, bool is_busy) -> bool {
+    auto slot = limiter.admit(address, false);
+    if (!slot) return false;
+    (*slot)->on_end([&ended, at = slots.size()] { ended[at] = true; });
+    if (is_busy) (*slot)->becomes(net::ConnectionSlot::busy);
+    slots.push_back(std::move(*slot));
+    return true;
+  };
+  ASSERT_TRUE(come("10.0.0.1", true) && come("10.0.0.1", true));
+  EXPECT_FALSE(slots[1]->is_reserve());
+  ASSERT_TRUE(come("10.0.0.1", false) && come("10.0.0.1", false)) << "its share holds for the others";
+  EXPECT_TRUE(slots[2]->is_reserve() && slots[3]->is_reserve());
+  ASSERT_TRUE(come("10.0.0.2", true));
+  EXPECT_TRUE(ended[2]) << "of the address with most of them, the oldest";
+  ASSERT_TRUE(come("10.0.0.2", true));
+  EXPECT_TRUE(ended[3]);
+  EXPECT_FALSE(come("10.0.0.3", false)) << "both are at a stop";
+}
+
 TEST_F(ConnectionLimiterTest, AddressesOfThisMachineHaveMoreAndNotAll) {
   for (int i = 0; i < 6; ++i) ASSERT_NE(come("127.0.0.1", net::ConnectionSlot::busy, true), nullptr);
   EXPECT_EQ(come("127.0.0.1", net::ConnectionSlot::unauthenticated, true), nullptr);
@@ -140,8 +213,8 @@ TEST_F(ConnectionLimiterTest, WhoWasEndedHasNoSayAnyMore) {
 // Each still has its descriptor; a flood that is faster than they go does not grow them without bound.
 TEST_F(ConnectionLimiterTest, ThoseWhoLeaveAreBounded) {
   for (int i = 0; i < 1000; ++i) come("10.0.0.1");
-  EXPECT_EQ(limiter.connections(), 3U + 64U);
-  EXPECT_EQ(limiter.counters().refused, 1000U - 3U - 64U);
+  EXPECT_EQ(limiter.connections(), 3U + net::kMaxLeaving);
+  EXPECT_EQ(limiter.counters().refused, 1000U - 3U - net::kMaxLeaving);
   go();
   EXPECT_NE(come("10.0.0.1"), nullptr);
 }
