@@ -2,7 +2,10 @@
 #include "server/tls/stream_socket.hpp"
 
 #include <array>
+#include <boost/asio/as_tuple.hpp>
+#include <boost/asio/cancellation_state.hpp>
 #include <boost/asio/error.hpp>
+#include <boost/asio/this_coro.hpp>
 #include <boost/asio/use_awaitable.hpp>
 
 namespace server::tls {
@@ -34,9 +37,13 @@ asio::mutable_buffer StreamSocket::scratch() {
   return asio::buffer(bytes);
 }
 
+// end() aborts the wait, and then the peer has gone as well: who was made to give way is worked for no further.
 asio::awaitable<void> StreamSocket::peer_gone() {
   for (;;) {
-    co_await socket_.async_wait(tcp::socket::wait_read, asio::use_awaitable);
+    const auto [error] = co_await socket_.async_wait(tcp::socket::wait_read, asio::as_tuple(asio::use_awaitable));
+    const auto state = co_await asio::this_coro::cancellation_state;
+    if (error && state.cancelled() != asio::cancellation_type::none) throw boost::system::system_error{error};
+    if (error) co_return;
     const Attempt ahead = wire_.peek();
     if (ahead.size > 0) co_await socket_.async_wait(tcp::socket::wait_error, asio::use_awaitable);
     if (ahead.size > 0 || ahead.has_ended()) co_return;

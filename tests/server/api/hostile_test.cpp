@@ -235,5 +235,19 @@ TEST_F(SmallHostileTest, IdleConnectionsOfKnownPeopleGiveWayAndBusyOnesStay) {
   EXPECT_EQ(robot->commands().size(), before + 1) << "a page that is open stops though all places are taken";
 }
 
+// Else it would hold one of the descriptors of those who leave until its time is over.
+TEST_F(SmallHostileTest, AQuestionThatGivesItsPlaceUpIsWorkedAtNoFurther) {
+  ASSERT_EQ(ask("POST", "/api/v1/experiments", {{"robot_id", "r1"}, {"profile", "figure_7"}}).status, 202);
+  std::vector<std::unique_ptr<RawClient>> polls;
+  for (int i = 0; i < 40; ++i) {
+    polls.push_back(dial("127.0.0.8"));
+    polls.back()->send(head("GET /api/v1/experiments/1?wait_ms=20000"));
+  }
+  clock.settle();
+  EXPECT_LE(security.http().limiter.connections(), 16U);
+  EXPECT_TRUE(polls.front()->read_until("\r\n").starts_with("HTTP/1.1 503 "));
+  expect_stops();
+}
+
 }  // namespace
 }  // namespace server
