@@ -44,7 +44,7 @@ boost::asio::awaitable<std::optional<T>> while_present(HttpStream& stream, boost
   }
 }
 
-// What the work gives, or nothing when the credential ends first that asked for it; null: nobody's, which never ends.
+// The result of the work, or nothing when the credential ends first that asked for it; null: nobody's, never ends.
 template <class T>
 boost::asio::awaitable<std::optional<T>> while_it_stands(std::shared_ptr<identity::Standing> standing,
                                                          boost::asio::awaitable<T> work) {

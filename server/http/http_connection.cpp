@@ -243,7 +243,7 @@ asio::awaitable<Next> HttpConnection::carry_out(Request request, RequestMessage 
     slot_.rest();  // SAFETY: who takes no answer holds no place of others by that
     co_return co_await sender_.send(std::move(response), message);
   }
-  // What is only asked may give its place up: at once while its answer is made, and where the client takes it slowly.
+  // A question may give its place up: at once while its answer is made, and where the client takes it slowly.
   if (request.caller.standing != nullptr) slot_.becomes(net::ConnectionSlot::waiting);
   const std::shared_ptr<identity::Standing> standing = request.caller.standing;
   const std::string actor = request.actor;

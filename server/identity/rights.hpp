@@ -1,4 +1,4 @@
-// What acts in somebody's name after they asked for it, in one list: all of it ends when their right ends.
+// The list of what acts in somebody's name after they asked for it: all of it ends when their right ends.
 //
 //   a token that is revoked or has expired, a user who is disabled, removed or may do less, a password or a session
 //   that another takes away → Accounts → Rights::end() → each part that was added
@@ -29,7 +29,7 @@ class Rights {
  public:
   struct Part {
     std::string what;  // for the log
-    Scope needs;       // whoever acts so must have it
+    Scope needs;       // of who acts so
     std::function<std::set<std::string>()> acting;
     std::function<void(const runtime::EndedRight&)> end;
   };

@@ -5,14 +5,17 @@
 //   slot->becomes(ConnectionSlot::busy);                 // the client has authenticated itself
 //
 // A slot is unauthenticated until its client has shown who it is. When a place is needed (the port is full, or an
-// address has its share), the address with most places loses one: its oldest unauthenticated one, else the one that is
-// idle the longest, else the oldest question that waits for its answer, else the long answer that moved least in the
-// last second, if that was below kSlowAnswer. Busy ones (stops, pages, what changes something) are never evicted. Where
-// nobody can give way, `reserve` further ones are let in, under the same rule, for stops and health alone. Refusals are
-// counted, and logged once a second. Places are counted without the busy ones: what nobody may take from an address is
-// held against it by nobody. SAFETY: so whoever takes places, by whatever connections, takes them from themselves; a
-// stop finds one; and a connection over which somebody may be about to stop a robot stays. Loop thread. Outlives its
-// slots.
+// address has its share), an address with a crowd of unauthenticated ones loses the oldest of them. Else the address
+// with most places loses one: its oldest unauthenticated one, else the one that is idle the longest, else the oldest
+// question that waits for its answer, else the long answer that moved least in the last second, if that was below
+// kSlowAnswer. Busy ones are never evicted, and do not count there: pages, welcomed robots, and a stop or a change
+// until it is answered. Where none can give way, `reserve` further ones are let in, under the same rule, for stops and
+// health alone. Refusals are counted, and logged once a second.
+//
+// SAFETY: so those who take places, by whatever connections, take them from themselves; a stop finds one; and a
+// connection over which somebody may be about to stop a robot stays.
+//
+// Loop thread. Outlives its slots.
 #pragma once
 
 #include <array>
@@ -73,7 +76,7 @@ class ConnectionLimiter {
       std::size_t here = 0;      // of them, without those who leave and the reserve
       std::size_t yielding = 0;  // of these, without the busy ones
       std::size_t unauthenticated = 0;
-      std::size_t in_reserve = 0;  // likewise, of the reserve
+      std::size_t in_reserve = 0;  // of the reserve, without the busy ones
     };
     using Counts = std::map<std::string, Count>;
 

@@ -42,8 +42,8 @@ class StreamSocket {
   template <class Buffers, class Token>
   auto async_write_some(const Buffers& bytes, Token&& token);
 
-  // Returns when the client has closed its side, also only half of it. What it sends ahead hides its end; then only a
-  // reset counts.
+  // Returns when the client has closed its side, also only half of it, or after end(). What it sends ahead hides its
+  // end; then only a reset counts.
   boost::asio::awaitable<void> peer_gone();
 
   // Gives the descriptor away, which the loop then knows no longer, and the wire over it.

@@ -1,4 +1,4 @@
-// What ends experiments from outside: an earlier start of the station, and a right that ends.
+// Experiments that end from outside: by an earlier start of the station, or with a right.
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 

@@ -78,7 +78,7 @@ RestsOwed::RestsOwed(runtime::Clock& clock, runtime::TaskGroup& tasks, station::
   station.add_sink(*this);
 }
 
-// What it throws ends the task alone.
+// An exception ends its task alone.
 void RestsOwed::spawn(const station::RobotId& robot_id, asio::awaitable<void> task) {
   const std::string name = "rest of robot '" + robot_id + "'";
   tasks_.spawn(name,
