@@ -28,6 +28,7 @@ ReplayCommand::ReplayCommand(CLI::App& app)
   command_->add_option("--duration-s", options_.duration_s, "end by itself after so long; 0: never")
       ->check(CLI::Range(0.0, 1e9))
       ->type_name("S");
+  command_->add_option("--ledger", options_.ledger, "write at the end what each robot's ring gave up, as JSON lines");
   command_->add_flag("--json", options_.json, "rates and summary as JSON lines");
 }
 

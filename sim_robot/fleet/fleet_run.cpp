@@ -10,7 +10,9 @@
 #include <boost/asio/steady_timer.hpp>
 #include <boost/asio/use_awaitable.hpp>
 #include <csignal>
+#include <fstream>
 #include <iostream>
+#include <nlohmann/json.hpp>
 #include <ostream>
 #include <stdexcept>
 
@@ -178,6 +180,20 @@ int run(const FleetOptions& options, asio::io_context& loop, Fleet& fleet, std::
   return report_end(watch, end);
 }
 
+// A line of JSON for each robot, with its ranges as [first_seq, next_seq).
+void write_ledger(const std::string& path, const std::vector<const ReplayedRobot*>& robots) {
+  std::ofstream file{path};
+  for (const ReplayedRobot* robot : robots) {
+    nlohmann::ordered_json line{{"robot_id", robot->config().robot_id},
+                                {"boot_id", robot->config().boot_id},
+                                {"acknowledged_next_seq", robot->acknowledged_next_seq()},
+                                {"overwritten", nlohmann::ordered_json::array()}};
+    for (const SampleRange& range : robot->overwritten()) line["overwritten"].push_back({range.first, range.next});
+    file << line.dump() << '\n';
+  }
+  if (!file.flush()) throw std::invalid_argument("--ledger: cannot write " + path);
+}
+
 std::string id_of(const FleetOptions& options, int number) { return options.id_prefix + '-' + std::to_string(number); }
 
 }  // namespace
@@ -204,6 +220,7 @@ int run_replay(const FleetOptions& options, const std::string& token, const Reco
   allow_sockets(options.robots);
   asio::io_context loop{1};
   Fleet::Members robots;
+  std::vector<const ReplayedRobot*> replayed;
   SimulatedRobotConfig named;  // for the check of id and token
   named.robot_id = id_of(options, options.robots);
   named.token = token;
@@ -216,10 +233,14 @@ int run_replay(const FleetOptions& options, const std::string& token, const Reco
   for (int i = 0; i < options.robots; ++i) {
     config.robot_id = id_of(options, i + 1);
     config.boot_id = random_boot_id();
-    robots.push_back(std::make_unique<ReplayedRobot>(loop, config, recording, options.station, LinkLog{}));
+    auto robot = std::make_unique<ReplayedRobot>(loop, config, recording, options.station, LinkLog{});
+    replayed.push_back(robot.get());
+    robots.push_back(std::move(robot));
   }
   Fleet fleet{loop, std::move(robots), ReplayedRobot::turn_period(recording, config.period_us)};
-  return run(options, loop, fleet, out, &acknowledged_after);
+  const int exit_status = run(options, loop, fleet, out, &acknowledged_after);
+  if (!options.ledger.empty()) write_ledger(options.ledger, replayed);
+  return exit_status;
 }
 
 }  // namespace sim_robot

@@ -22,6 +22,7 @@ struct FleetOptions {
   bool json = false;                       // JSON lines
   std::chrono::milliseconds handshake{0};  // see RobotClient
   std::vector<TimedFault> faults;          // of each robot, in its own time
+  std::string ledger;                      // replay only: a file for what each robot knows at the end; empty: none
 };
 
 // Robots of one kind: each has its own id, boot id and seed (the kind's seed and those that follow).

@@ -64,9 +64,10 @@ void ReplayedRobot::make_frames() {
     live_.end = next_;
   }
   while (recording_.first_seq(next_) - oldest_seq() > kRingSamples) {
-    counts_.lost += recording_.end_seq(oldest_) - oldest_seq();
+    if (!std::exchange(gap_grows_, true)) overwritten_.push_back({oldest_seq(), oldest_seq()});
+    overwritten_.back().next = recording_.end_seq(oldest_);
+    counts_.lost += overwritten_.back().next - oldest_seq();
     ++oldest_;
-    if (!std::exchange(gap_grows_, true)) ++counts_.gaps;
   }
 }
 
@@ -130,6 +131,7 @@ bool ReplayedRobot::on_welcome(const protocol::Welcome& welcome) {
 // A frame is held until all of it is durable.
 void ReplayedRobot::acknowledge(std::uint64_t next_seq) {
   if (next_seq > recording_.first_seq(next_)) return;
+  acknowledged_next_seq_ = std::max(acknowledged_next_seq_, next_seq);
   const auto now_us = static_cast<std::int64_t>(robot_time_us());
   while (oldest_ < next_ && recording_.end_seq(oldest_) <= next_seq) {
     const std::uint64_t made_us = (recording_.end_seq(oldest_) - 1) * config_.period_us;
@@ -224,12 +226,14 @@ void ReplayedRobot::fill_hello(protocol::Hello& hello) const {
   hello.ring_capacity = kRingSamples;
   hello.oldest_seq = oldest_seq();
   hello.next_seq = recording_.first_seq(next_);
+  hello.acknowledged_next_seq = acknowledged_next_seq_;
   hello.mode = rheonaut_MODE_MANUAL;
   hello.answers_stop_probes = true;
 }
 
 SampleCounts ReplayedRobot::samples() const {
   SampleCounts counts = counts_;
+  counts.gaps = overwritten_.size();
   counts.made = recording_.first_seq(next_);
   counts.held = counts.made - oldest_seq();
   counts.acknowledged = oldest_seq() - counts.lost;

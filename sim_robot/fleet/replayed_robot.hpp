@@ -1,13 +1,14 @@
 // A robot for load tests that computes nothing: it sends the frames of a recording as its own, on time.
 //
 // To a station it is a robot with a boot of its own, samples from 0 on without a gap, a clock that runs with the
-// host's, acknowledgements, resends and a ring of kRingSamples that counts what falls out as lost. As frames can be
-// written again at any time, it keeps numbers and not bytes. It answers clock probes, says its status each second, and
-// refuses every command as unsupported: it has no motor. So it never acknowledges an emergency stop as carried out.
+// host's, acknowledgements, resends and a ring of kRingSamples that keeps the numbers of what falls out. As frames can
+// be written again at any time, it keeps numbers and not bytes. It answers clock probes, says its status each second,
+// and refuses every command as unsupported: it has no motor. So it never acknowledges an emergency stop as carried out.
 // One thread: that of `loop`. Loop and recording must outlive the robot.
 #pragma once
 
 #include <deque>
+#include <vector>
 
 #include "sim_robot/client/fleet_member.hpp"
 #include "sim_robot/client/lateness.hpp"
@@ -21,6 +22,10 @@ struct ReplayConfig {
   std::uint64_t boot_id = 1;
   std::uint32_t period_us = 10'000;        // of samples
   Lateness* acknowledged_after = nullptr;  // of each frame, from its last sample to its acknowledgement
+};
+
+struct SampleRange {  // [first, next)
+  std::uint64_t first = 0, next = 0;
 };
 
 class ReplayedRobot final : public FleetMember, private Speaker {
@@ -42,6 +47,11 @@ class ReplayedRobot final : public FleetMember, private Speaker {
 
   SampleCounts samples() const override;
   const StationConnection& connection() const override { return connection_; }
+  // What left the ring before it was acknowledged, ascending: whole frames, of some of which the station may have had a
+  // part. A station may note no other sample as overrun.
+  const std::vector<SampleRange>& overwritten() const { return overwritten_; }
+  const ReplayConfig& config() const { return config_; }
+  std::uint64_t acknowledged_next_seq() const { return acknowledged_next_seq_; }
 
  private:
   enum class Phase { closed, greeting, up };
@@ -86,7 +96,9 @@ class ReplayedRobot final : public FleetMember, private Speaker {
   std::uint64_t stop_probe_us_ = 0;  // to be answered; 0: none
   std::uint64_t received_at_us_ = 0, sent_at_us_ = 0, status_due_us_ = 0;
   std::uint64_t silence_us_ = 0, heartbeat_us_ = 0;
+  std::uint64_t acknowledged_next_seq_ = 0;
   SampleCounts counts_;
+  std::vector<SampleRange> overwritten_;
   bool gap_grows_ = false;
 };
 

@@ -56,10 +56,10 @@ class Lab:
         self.bin = BIN  # the programs
         self.is_damaged = False  # the test has damaged the database: it leaves no records
 
-    def _start(self, name, *arguments):
+    def _start(self, name, *arguments, environment=None):
         log = open(self.folder / f"{name}.log", "ab")
         process = subprocess.Popen([str(self.bin / arguments[0]), *map(str, arguments[1:])], stdout=log,
-                                   stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL)
+                                   stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL, env=os.environ | (environment or {}))
         log.close()
         if arguments[0] == "rheonaut-sim":  # a real one has a processor of its own
             hurry(process)
@@ -76,15 +76,16 @@ class Lab:
             print(self.log("station"))
             raise
 
-    def start_unannounced(self, http, robots, config=None):
-        """Does not wait for it: on a full disk the station cannot say where it is. `config` is TOML, or else the lab's."""
+    def start_unannounced(self, http, robots, config=None, environment=None):
+        """Does not wait for it: on a full disk the station cannot say where it is. `config` is TOML, or else the lab's;
+        `environment` is added to this program's."""
         flags = []
         config = self.config if config is None else config
         if config is not None:
             (self.folder / "rheonaut.toml").write_text(config)
             flags = ["--config", self.folder / "rheonaut.toml"]
         self.station_process = self._start("station", "rheonaut", "serve", "--data", self.data, "--http", http,
-                                           "--robots", robots, *flags)
+                                           "--robots", robots, *flags, environment=environment)
 
     def tool(self, *arguments):
         """`rheonaut …`, run to its end."""

@@ -1,5 +1,6 @@
 """What must hold of a station's database when the station has stopped, asked with plain SQL."""
 import contextlib
+import json
 import sqlite3
 
 
@@ -41,3 +42,25 @@ def audit(path):
         if without:
             faults.append(f"{without} segments without all of their rows")
     return faults, stored, lost
+
+
+def signed(id_of_64_bits):
+    """As SQLite has it."""
+    return id_of_64_bits - (1 << 64) if id_of_64_bits >> 63 else id_of_64_bits
+
+
+def outside_ledger(path, ledger):
+    """What is noted as overrun though its robot's ring had not given it up, or is missing though it was acknowledged; the
+    ledger is of `rheonaut-sim replay --ledger`. [] if nothing."""
+    found = []
+    with contextlib.closing(sqlite3.connect(path)) as database:
+        boots = intervals_by_boot(database)
+    with open(ledger) as lines:
+        for line in lines:
+            robot = json.loads(line)
+            for first, last, what in boots.get(signed(robot["boot_id"]), []):
+                given_up = any(begin <= first and last < end for begin, end in robot["overwritten"])
+                if what != "stored" and not given_up:
+                    found.append(f"{robot['robot_id']}: {first} to {last} {what}, acknowledged below "
+                                 f"{robot['acknowledged_next_seq']}, overwritten {robot['overwritten']}")
+    return found
