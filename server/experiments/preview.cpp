@@ -77,7 +77,7 @@ void measure(Preview& preview) {
 }  // namespace
 
 Preview preview_of(const Profile& profile, const TimeLine& line, const control::FractionalModel& model,
-                   const control::ParallelSections& sections, double duty_min, double duty_max) {
+                   const control::ParallelSections& sections, double duty_min, double duty_max, double from_m) {
   control::ModalPlant plant{model, kTick_s};
   control::SectionFilter controller{sections};
   Commanded commanded;
@@ -85,15 +85,16 @@ Preview preview_of(const Profile& profile, const TimeLine& line, const control::
   auto next = line.actions.begin();
   for (std::uint64_t tick = 0; tick <= line.ticks; ++tick) {
     for (; next != line.actions.end() && next->tick <= tick; ++next) apply(*next, commanded, controller);
-    const double measured_m = plant.position_m() + commanded.disturbance_m;
+    const double position_m = from_m + plant.position_m();
+    const double measured_m = position_m + commanded.disturbance_m;
     const double wanted = commanded.is_auto ? controller.step(commanded.setpoint_m - measured_m) : commanded.duty;
     const double duty = std::clamp(wanted, duty_min, duty_max);  // (1)
     preview.time_s.push_back(static_cast<double>(tick) * kTick_s);
-    preview.position_m.push_back(plant.position_m());
+    preview.position_m.push_back(position_m);
     preview.velocity_m_s.push_back(plant.velocity_m_s());
     preview.duty.push_back(duty);
     preview.setpoint_m.push_back(commanded.is_auto ? commanded.setpoint_m : std::numeric_limits<double>::quiet_NaN());
-    if (!(std::abs(plant.position_m()) < kDiverged_m)) break;
+    if (!(std::abs(position_m) < kDiverged_m)) break;
     plant.step(duty);
   }
   measure(preview);

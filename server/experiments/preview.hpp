@@ -3,7 +3,8 @@
 //   manual: u = duty;  auto: u = clamp(G(z)(setpoint - (x + disturbance)));  x from the plant under u held      (1)
 //
 // The controller begins from rest whenever auto begins. The model's position is exact, where the robot has an estimate;
-// neither flow nor noise is in it. Pure. Errors: throws std::invalid_argument quoting the bad value.
+// neither flow nor noise is in it. The run begins at rest at `from_m`. Pure. Errors: throws std::invalid_argument
+// quoting the bad value.
 #pragma once
 
 #include <string>
@@ -24,6 +25,7 @@ struct Preview {
 };
 
 Preview preview_of(const Profile& profile, const TimeLine& line, const control::FractionalModel& plant,
-                   const control::ParallelSections& controller, double duty_min = -1, double duty_max = 1);
+                   const control::ParallelSections& controller, double duty_min = -1, double duty_max = 1,
+                   double from_m = 0);
 
 }  // namespace server::experiments

@@ -22,12 +22,17 @@ class LoopWatch {
   // It has worked off all that there was: what it reads from now on has not waited.
   void rest() { unread_since_us_.reset(); }
 
+  // How long the latest standstill lasted that ended less than so long ago; 0: there was none.
+  std::chrono::microseconds stood_still_within(std::chrono::microseconds before, std::int64_t now_us) const;
+
   // For how long what is read now may have lain unread because the loop stood still; 0: it has just come.
   std::chrono::microseconds unread_for(std::int64_t now_us);
 
  private:
   std::optional<std::int64_t> last_us_;          // turn
   std::optional<std::int64_t> unread_since_us_;  // after a standstill, until it rests
+  std::int64_t stood_until_us_ = 0;              // the latest standstill
+  std::chrono::microseconds stood_for_{0};
 };
 
 }  // namespace server::runtime

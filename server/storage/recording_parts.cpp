@@ -14,6 +14,11 @@ std::filesystem::path backup_folder(const std::filesystem::path& database, const
   return std::filesystem::absolute(config.backup_dir.empty() ? database.parent_path() / "backups" : config.backup_dir);
 }
 
+RecorderOptions with_rescue(RecorderOptions options, const config::RecordingConfig& config) {
+  options.rescue = {config.backup_dir, space_limits(config).critical_bytes};
+  return options;
+}
+
 RetentionPolicy retention_policy(const config::RecordingConfig& config) {
   return {config.retention_days, config.event_retention_days, config.max_database_mb * std::uint64_t{1'000'000}};
 }
@@ -24,7 +29,7 @@ RecordingParts::RecordingParts(asio::io_context& loop, runtime::Clock& clock, ru
                                runtime::WorkerThread& readers, runtime::WorkerThread& exports_worker,
                                runtime::WorkerThread& checkpoints, const RecorderOptions& options,
                                const config::RecordingConfig& config)
-    : recorder{loop, clock, disk, checkpoints, options},
+    : recorder{loop, clock, disk, checkpoints, with_rescue(options, config)},
       head_watch{clock, recorder, checkpoints, options.head_interval},
       reader{options.path, readers},
       digester{clock, recorder, reader},
@@ -62,6 +67,11 @@ void RecordingParts::connect(station::Station& station) {
 
 asio::awaitable<RestoredState> RecordingParts::open() {
   RestoredState restored = co_await recorder.open();
+  // SAFETY: of the file that the station works with, whatever has its name later.
+  for (DatabaseReader* each : {&reader, &history.reader(), &exports.reader()}) {
+    auto open = [](SQLite::Database& database) { return database.execAndGet("PRAGMA schema_version").getInt64(); };
+    co_await each->ask(std::move(open));
+  }
   co_await head_watch.open();
   backups.set_store_id(restored.store_id);
   std::error_code ignored;
@@ -83,7 +93,7 @@ void RecordingParts::spawn(runtime::TaskGroup& tasks) {
   tasks.spawn("head of the database", head_watch.run());
   tasks.spawn("digester", digester.run());
   tasks.spawn("finalizer", finalizer.run());
-  tasks.spawn("interrupted runs", runs.finish_loading());
+  tasks.spawn("runs", runs.run());
   tasks.spawn("disk watch", disk_watch.run());
   tasks.spawn("jobs", jobs.run());
   tasks.spawn("backups", backups.run());
@@ -95,7 +105,7 @@ void RecordingParts::close() {
   backups.close();
   for (DatabaseReader* each : {&reader, &history.reader(), &exports.reader()}) each->close();
   recorder.close([this](Database& database, std::int64_t utc_us) {  // what fails is done by the next start
-    if (runs.any_open()) RunStore{database, {}}.interrupt(utc_us);
+    if (runs.any_open()) RunStore{database}.interrupt(utc_us);
   });
   head_watch.close();
 }

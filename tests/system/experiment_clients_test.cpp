@@ -93,7 +93,7 @@ TEST_F(ExperimentClientsTest, ItGoesOnForItsOwnClientAlone) {
   });
   pass(400ms, [&] { station.keep_control(kSecond, "sim-1", 0us); });
   EXPECT_EQ(duty(), 0) << "its last sign counts for 400 ms, a lease for 500 ms";
-  expect_aborted(id, "nobody_present", 10s);
+  expect_aborted(id, "nobody_present", 20s);
 }
 
 TEST_F(ExperimentClientsTest, WhoTakesItOverKeepsItAlone) {
@@ -105,7 +105,7 @@ TEST_F(ExperimentClientsTest, WhoTakesItOverKeepsItAlone) {
   EXPECT_NE(duty(), 0);
   pass(1s, [&] { sign(kFirst, id); });
   EXPECT_EQ(duty(), 0);
-  expect_aborted(id, "nobody_present", 10s);
+  expect_aborted(id, "nobody_present", 20s);
 }
 
 // What waits on the robot for its time is the experiment's, and goes on with it.

@@ -130,5 +130,128 @@ TEST_F(ExperimentFaultsTest, ARobotThatWasSwitchedOffForItsFluidGoesOnWhenItsAct
   EXPECT_EQ(until(id, ExperimentState::done).runs.size(), 2U);
 }
 
+// --- a disk that fails while one runs ---
+
+class FailingDiskTest : public ExperimentFaultsTest {
+ protected:
+  // No commit succeeds until mend().
+  void fail_disk() {
+    SQLite::Database foreign{recorder->path().string(), SQLite::OPEN_READWRITE, 5000};
+    foreign.exec("CREATE TRIGGER full BEFORE UPDATE ON meta BEGIN SELECT RAISE(ABORT, 'the disk is full'); END");
+  }
+  void mend() {
+    SQLite::Database{recorder->path().string(), SQLite::OPEN_READWRITE, 5000}.exec("DROP TRIGGER full");
+    EXPECT_TRUE(clock.run_until([&] { return !recorder->failing(); }, 5s));
+  }
+};
+
+TEST_F(FailingDiskTest, TheEndOfARunIsStoredWhenTheDiskIsBackAndTheNextOnesRun) {
+  begin();
+  const auto id = start(profile({"kind = \"duty\"\nduty = 0.2\nfor_s = 2"}, "[sweep]\nrepeats = 2\n"));
+  const auto next = enqueue(profile({kRest}));
+  clock.run_for(1s);
+  fail_disk();
+  clock.run_for(8s);
+  EXPECT_EQ(view(id).experiment.state, ExperimentState::running);
+  EXPECT_EQ(view(id).activity, "storing the end of its run");
+  EXPECT_EQ(robot->simulated().motor_duty(), 0);
+  mend();
+  const auto done = until(id, ExperimentState::done);
+  ASSERT_EQ(done.runs.size(), 2U);
+  for (const auto& run : done.runs) {
+    const auto recorded = wait_for(runs->find(run.run.value()));
+    EXPECT_EQ(recorded->state, storage::RunState::ended);
+    EXPECT_LT(recorded->samples_expected, 350U) << "2 s, and what is around them";
+  }
+  until(next, ExperimentState::done);
+}
+
+TEST_F(FailingDiskTest, ARunBeginsWhenTheDiskIsBack) {
+  begin();
+  come("anna");
+  fail_disk();
+  const auto id = enqueue(profile({kRest}));
+  clock.run_for(8s);
+  EXPECT_EQ(view(id).activity, "waiting for the disk, to begin its run");
+  mend();
+  until(id, ExperimentState::done);
+}
+
+TEST_F(FailingDiskTest, ARunThatHasWaitedForLongBeginsWhenSomebodyResumesIt) {
+  begin();
+  come("anna");
+  fail_disk();
+  const auto id = enqueue(profile({kRest}));
+  EXPECT_EQ(until(id, ExperimentState::paused).reason, "not_recorded");
+  mend();
+  clock.run_for(20s);
+  EXPECT_EQ(view(id).experiment.state, ExperimentState::paused);
+  ASSERT_TRUE(wait_for(experiments->resume(id, {"anna", "", 0})));
+  until(id, ExperimentState::done);
+}
+
+TEST_F(FailingDiskTest, ARunThatCannotBeginWaitsForNobodyWhoIsAway) {
+  begin();
+  come("anna");
+  fail_disk();
+  const auto id = enqueue(profile({kRest}));
+  clock.run_for(5s);
+  leave("anna");
+  expect_aborted(id, "nobody_present");
+}
+
+TEST_F(FailingDiskTest, NothingMovesForLongWhatIsNotRecorded) {
+  begin();
+  const auto id = start(profile({kTenSeconds}));
+  clock.run_for(1s);
+  fail_disk();
+  clock.run_for(3s);
+  EXPECT_EQ(view(id).experiment.state, ExperimentState::running) << "half of the ring is 4 s";
+  clock.run_for(2500ms);
+  EXPECT_EQ(view(id).experiment.state, ExperimentState::paused);
+  EXPECT_EQ(view(id).experiment.reason, "not_recorded");
+  EXPECT_NE(view(id).experiment.detail.find("the disk is full"), std::string::npos) << view(id).experiment.detail;
+  EXPECT_EQ(robot->simulated().motor_duty(), 0);
+  ASSERT_TRUE(wait_for(experiments->resume(id, {"anna", "", 0})));
+  clock.run_for(2s);
+  EXPECT_EQ(view(id).experiment.state, ExperimentState::paused) << "nothing is recorded yet";
+  mend();
+  clock.run_for(5s);
+  EXPECT_EQ(view(id).experiment.state, ExperimentState::paused) << "until a person resumes it";
+  EXPECT_EQ(robot->simulated().motor_duty(), 0);
+  ASSERT_TRUE(wait_for(experiments->resume(id, {"anna", "", 0})));
+  until(id, ExperimentState::done);
+}
+
+TEST_F(FailingDiskTest, PeopleCommandAndStopTheRobotMeanwhile) {
+  begin();
+  fail_disk();
+  clock.run_for(6s);
+  EXPECT_TRUE(command_by("anna", sim_robot::set_duty(0.2F)));
+  clock.run_for(100ms);
+  EXPECT_NE(robot->simulated().motor_duty(), 0);
+  station::StopRequest stop{"sim-1", "anna", "127.0.0.1", "", 0};
+  EXPECT_EQ(wait_for(station.emergency_stop(std::move(stop), 1s)).value().state, station::CommandState::acknowledged);
+  clock.run_for(50ms);
+  EXPECT_EQ(robot->simulated().motor_duty(), 0);
+}
+
+// --- a command that comes too late to a robot that rests ---
+
+TEST_F(ExperimentFaultsTest, ALateCommandToARestingRobotIsGivenAgain) {
+  begin();
+  come("anna");
+  const auto id = enqueue(profile({kRest, "kind = \"duty\"\nduty = 0.2\nfor_s = 1"}));
+  until(id, ExperimentState::running);
+  ASSERT_TRUE(clock.run_until([&] { return view(id).progress && view(id).progress->elapsed_s > 0.55; }, 20s));
+  robot->stall(true);  // the duty is sent now, and arrives behind its time and its grace
+  clock.run_for(650ms);
+  robot->stall(false);
+  clock.run_for(300ms);
+  EXPECT_EQ(view(id).experiment.state, ExperimentState::paused);
+  EXPECT_EQ(view(id).experiment.reason, "command_late") << view(id).experiment.detail;
+  until(id, ExperimentState::done);
+}
+
 }  // namespace
 }  // namespace server

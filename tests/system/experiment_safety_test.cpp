@@ -30,7 +30,7 @@ TEST_F(ExperimentSafetyTest, NothingBeginsWithoutSomebodyWhoIsThere) {
   until(id, ExperimentState::running);
 }
 
-TEST_F(ExperimentSafetyTest, WithoutSignsOfLifeTheMotorStopsAndThePageThatComesBackRepeatsTheStep) {
+TEST_F(ExperimentSafetyTest, WithoutSignsOfLifeTheMotorStopsAndThePageThatComesBackGoesOn) {
   const auto id = start(profile({kLongDuty}));
   ASSERT_TRUE(clock.run_until([&] { return duty() != 0; }, 5s));
   clock.run_for(1s);
@@ -42,16 +42,18 @@ TEST_F(ExperimentSafetyTest, WithoutSignsOfLifeTheMotorStopsAndThePageThatComesB
   EXPECT_EQ(duty(), 0);
   EXPECT_EQ(view(id).experiment.reason, "nobody_present");
   come("anna");
+  clock.run_for(2800ms);
+  EXPECT_EQ(duty(), 0) << "it counts down";
   ASSERT_TRUE(clock.run_until([&] { return duty() != 0; }, 3s));
   until(id, ExperimentState::done);
-  EXPECT_EQ(nlohmann::json::parse(view(id).experiment.runs.at(0).steps).size(), 2U);
+  EXPECT_EQ(nlohmann::json::parse(view(id).experiment.runs.at(0).steps).size(), 1U);
 }
 
 TEST_F(ExperimentSafetyTest, WhoStaysAwayEndsIt) {
   const auto id = start(profile({kLongDuty}));
   clock.run_for(1s);
   leave("anna");
-  expect_aborted(id, "nobody_present", 10s);
+  expect_aborted(id, "nobody_present", 20s);
 }
 
 TEST_F(ExperimentSafetyTest, InAutoTooWhoStaysAwayEndsIt) {
@@ -60,7 +62,7 @@ TEST_F(ExperimentSafetyTest, InAutoTooWhoStaysAwayEndsIt) {
   leave("anna");
   clock.run_for(2s);
   EXPECT_EQ(state().context.mode, rheonaut_MODE_AUTO) << "a page that is loaded again";
-  expect_aborted(id, "nobody_present", 10s);
+  expect_aborted(id, "nobody_present", 20s);
 }
 
 TEST_F(ExperimentSafetyTest, ADutyDoesNotBeginWhileNobodyIsThere) {
@@ -69,7 +71,7 @@ TEST_F(ExperimentSafetyTest, ADutyDoesNotBeginWhileNobodyIsThere) {
   leave("anna");
   clock.run_for(1500ms);
   EXPECT_EQ(duty(), 0);
-  expect_aborted(id, "nobody_present", 10s);
+  expect_aborted(id, "nobody_present", 20s);
 }
 
 TEST_F(ExperimentSafetyTest, AStopBetweenItsRequestAndItsPlaceInTheQueueHoldsIt) {
@@ -117,12 +119,13 @@ TEST_F(ExperimentSafetyTest, APauseAtTheEndOfARunHoldsTheNextOne) {
 
 // Its ticks are those of another length: a profile would play slower or faster, and its lease end too late.
 TEST_F(ExperimentSafetyTest, ARobotWithAnotherSamplePeriodIsNotMoved) {
-  come("anna");
-  const_cast<station::RobotState&>(state()).sample_period_us = 20'000;
   const auto id = enqueue(profile({kLongDuty}));
+  const_cast<station::RobotState&>(state()).sample_period_us = 20'000;
+  come("anna");
   clock.run_for(8s);
   EXPECT_EQ(view(id).waits_for, "sample_period");
   EXPECT_EQ(duty(), 0);
+  EXPECT_EQ(try_to_begin(profile({kLongDuty})).error().reason, "sample_period") << "it would wait for ever";
 }
 
 TEST_F(ExperimentSafetyTest, APersonsPauseOutlivesThatOfAnAbsentPage) {
@@ -142,7 +145,7 @@ TEST_F(ExperimentSafetyTest, AutoIsNotEnteredForSomebodyWhoHasGone) {
   const auto id = start(profile({"kind = \"rest\"\nfor_s = 2", kLongSetpoint}));
   clock.run_for(500ms);
   leave("anna");
-  expect_aborted(id, "nobody_present", 10s);
+  expect_aborted(id, "nobody_present", 20s);
   for (const auto& one : samples_of_first_run(id)) ASSERT_EQ(one.mode, rheonaut_MODE_MANUAL);
 }
 
@@ -150,8 +153,8 @@ TEST_F(ExperimentSafetyTest, ARebootBetweenPreparationAndMotionEndsIt) {
   come("anna");
   const auto id = enqueue(profile({kLongSetpoint}));
   ASSERT_TRUE(clock.run_until([&] { return view(id).experiment.state == ExperimentState::running; }, 5s));
-  robot->cut();
-  expect_aborted(id, "link_lost");
+  switch_off_and_on();
+  expect_aborted(id, "reboot");
   EXPECT_EQ(runs->any_open(), false) << "no run stays open";
 }
 
@@ -202,13 +205,12 @@ TEST_F(ExperimentSafetyTest, ACommandOfItsOwnOperatorEndsIt) {
   expect_aborted(id, "operator_command");
 }
 
-TEST_F(ExperimentSafetyTest, ACommandOfItsOwnThatTheRobotDropsLaterEndsIt) {
+TEST_F(ExperimentSafetyTest, WhoDropsWhatWaitsOnTheRobotEndsIt) {
   const auto id = start(profile({kLongSetpoint, kLater}));
   ASSERT_TRUE(clock.run_until([&] { return view(id).progress && view(id).progress->elapsed_s > 9.75; }, 20s));
   ASSERT_EQ(state().context.mode, rheonaut_MODE_AUTO);
   ASSERT_TRUE(command_by("anna", sim_robot::drop_timed())) << "the disturbance waits on the robot";
-  expect_aborted(id, "command_refused");
-  EXPECT_NE(view(id).experiment.detail.find("inject_disturbance"), std::string::npos) << view(id).experiment.detail;
+  expect_aborted(id, "operator_command");
   for (const auto& one : samples_of_first_run(id)) ASSERT_EQ(one.disturbance_m, 0.0F);
 }
 
@@ -244,13 +246,6 @@ TEST_F(ExperimentSafetyTest, ControlThatWasTakenIsNotTakenBack) {
   EXPECT_EQ(station.holder("sim-1"), "boris");
 }
 
-TEST_F(ExperimentSafetyTest, ALostLinkEndsItAndNothingActsAfterwards) {
-  const auto id = start(profile({kLongSetpoint, kLater}));
-  clock.run_for(1s);
-  robot->cut();
-  expect_aborted(id, "link_lost");
-}
-
 TEST_F(ExperimentSafetyTest, ARobotThatCannotBeReachedIsStoppedWhenItIsBack) {
   const auto id = start(profile({kLongSetpoint, kLater}));
   clock.run_for(1s);
@@ -262,14 +257,14 @@ TEST_F(ExperimentSafetyTest, ARobotThatCannotBeReachedIsStoppedWhenItIsBack) {
   EXPECT_EQ(duty(), 0) << "by its own rule";
 }
 
-TEST_F(ExperimentSafetyTest, ASilentLinkEndsIt) {
+TEST_F(ExperimentSafetyTest, OnASilentLinkTheMotorStops) {
   const auto id = start(profile({kLongDuty}));
   clock.run_for(1s);
   robot->stall(true);
   clock.run_for(1500ms);
   EXPECT_EQ(duty(), 0);
   robot->stall(false);
-  until(id, ExperimentState::aborted);
+  until(id, ExperimentState::done);
 }
 
 TEST_F(ExperimentSafetyTest, TheAbortCriteriaOfTheProfileEndIt) {

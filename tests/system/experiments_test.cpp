@@ -101,7 +101,7 @@ TEST_F(ExperimentsTest, OthersAreRefusedWhileItRuns) {
   until(id, ExperimentState::done);
 }
 
-TEST_F(ExperimentsTest, PausedAndResumedItRepeatsTheStep) {
+TEST_F(ExperimentsTest, PausedAndResumedItGoesOnWhereItWas) {
   const auto id = start(profile({kRest, kDuty}));
   clock.run_for(1500ms);
   ASSERT_TRUE(wait_for(experiments->pause(id, {"boris", "", 0})));
@@ -112,11 +112,10 @@ TEST_F(ExperimentsTest, PausedAndResumedItRepeatsTheStep) {
   ASSERT_TRUE(wait_for(experiments->resume(id, {"anna", "", 0})));
   until(id, ExperimentState::done);
   const auto steps = nlohmann::json::parse(view(id).experiment.runs.at(0).steps);
-  ASSERT_EQ(steps.size(), 3U) << steps;
-  EXPECT_EQ(steps[2]["step"], 2);
+  ASSERT_EQ(steps.size(), 2U) << steps;
   std::size_t driven = 0;
   for (const auto& one : samples_of_first_run(id)) driven += one.sample.duty != 0 ? 1U : 0U;
-  EXPECT_GT(driven, 300U) << "the whole step once more";
+  EXPECT_NEAR(static_cast<double>(driven), 300, 5);
 }
 
 TEST_F(ExperimentsTest, TheHighestPriorityBeginsFirstAndAnAbortHoldsTheQueue) {

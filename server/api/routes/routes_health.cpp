@@ -18,8 +18,8 @@ json problems(const RecordingRoutes& parts) {
   if (recording.recorder.failing()) {
     add("recording_failing", "nothing becomes durable now; the log and GET /api/v1/recording say why");
   }
-  if (!recording.disk_watch.use().is_writable) {
-    add("database_read_only", "the database's file cannot be written: look at the disk and at the file's owner");
+  if (!recording.recorder.failing() && !recording.disk_watch.use().is_writable) {
+    add("database_read_only", "the database's file is not there, or cannot be written: look at the data folder");
   }
   if (recording.disk_watch.state() == storage::SpaceState::critical) {
     add("low_space", "the disk has less room than recording.critical_space_mb: make room");

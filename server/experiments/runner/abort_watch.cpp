@@ -3,8 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
+#include <string_view>
 #include <utility>
 
 namespace server::experiments {
@@ -32,6 +34,13 @@ std::optional<Abort> fault_of(const station::CommandRecord& accepted) {
   const bool is_duty = accepted.kind == "set_duty" || accepted.kind == "set_duty_schedule";
   const char* advice = is_duty && accepted.reason == "out_of_range" ? kDutyAdvice : "";
   return Abort{"command_refused", fmt::format("{}: {}{}{}", accepted.kind, state, reason, advice)};
+}
+
+bool is_late(const station::CommandRecord& record) {
+  constexpr std::array<std::string_view, 6> kUnheard{"expired",       "link_lost",        "no_answer",
+                                                     "not_connected", "not_sent_in_time", "too_old_on_arrival"};
+  const bool has_no_reason = record.state == station::CommandState::expired && record.reason.empty();
+  return has_no_reason || std::ranges::find(kUnheard, record.reason) != kUnheard.end();
 }
 
 void AbortWatch::on_samples(const station::SampleBatch& batch, std::int64_t now_us) {
@@ -87,8 +96,7 @@ void AbortWatch::judge(const station::SampleBatch& batch, const station::Sample&
   }
 }
 
-std::optional<Abort> AbortWatch::check(std::int64_t now_us) const {
-  if (found_) return found_;
+std::optional<Abort> AbortWatch::late(std::int64_t now_us) const {
   const double gap_s = static_cast<double>(now_us - received_at_us_) / 1e6;
   if (gap_s > criteria_.gap_s) {
     return Abort{"gap", fmt::format("no sample came for {:.2f} s, abort.gap_s is {} s", gap_s, criteria_.gap_s)};

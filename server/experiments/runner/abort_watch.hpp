@@ -24,6 +24,9 @@ struct Abort {
 // the next command of the run replaced before a sample showed it has been done: samples are missing, which is counted.
 std::optional<Abort> fault_of(const station::CommandRecord& accepted);
 
+// It came too late, or nobody knows whether it came: no refusal. To a robot that is at rest it is given again.
+bool is_late(const station::CommandRecord& record);
+
 class AbortWatch {
  public:
   // `now_us` is steady, here and below.
@@ -32,8 +35,10 @@ class AbortWatch {
   // In any order: older samples may come after newer ones.
   void on_samples(const station::SampleBatch& batch, std::int64_t now_us);
 
-  // What speaks against going on; the first of it stays.
-  std::optional<Abort> check(std::int64_t now_us) const;
+  // A value beyond its bound; the first of it stays.
+  const std::optional<Abort>& fault() const { return found_; }
+  // Samples are late, or missing: that may pass.
+  std::optional<Abort> late(std::int64_t now_us) const;
 
  private:
   static constexpr std::size_t kWindow = 1000;  // samples: 10 s

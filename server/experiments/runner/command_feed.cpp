@@ -10,9 +10,13 @@ constexpr std::size_t kMostEntries = std::size(rheonaut_SetDutySchedule{}.duty);
 
 }  // namespace
 
-CommandFeed::CommandFeed(const TimeLine& line, std::size_t first_step, std::uint64_t begins_at_robot_us)
-    : line_{&line}, first_tick_{line.step_begins.at(first_step)}, begins_at_robot_us_{begins_at_robot_us} {
-  const auto first = std::ranges::find_if(line.actions, [&](const Action& one) { return one.step >= first_step; });
+CommandFeed::CommandFeed(const TimeLine& line, std::size_t first_step, std::uint64_t begins_at_robot_us,
+                         std::uint64_t first_tick)
+    : line_{&line},
+      first_tick_{std::max(line.step_begins.at(first_step), first_tick)},
+      begins_at_robot_us_{begins_at_robot_us} {
+  const auto first = std::ranges::find_if(
+      line.actions, [&](const Action& one) { return one.step >= first_step && one.tick >= first_tick_; });
   next_ = static_cast<std::size_t>(first - line.actions.begin());
 }
 
@@ -137,14 +141,34 @@ FedCommand CommandFeed::schedule() {
   return fed;
 }
 
+// The last action of a step says its mode: the first may be that of the change.
+bool is_of_auto(const TimeLine& line, std::size_t step) {
+  const auto last = std::ranges::find(line.actions.rbegin(), line.actions.rend(), step, &Action::step);
+  return last != line.actions.rend() && last->kind != ActionKind::duty;
+}
+
 std::size_t step_to_repeat(const TimeLine& line, std::size_t step) {
-  const auto is_of_auto = [&line](std::size_t index) {
-    // The last action of a step says its mode: the first may be that of the change.
-    const auto last = std::ranges::find(line.actions.rbegin(), line.actions.rend(), index, &Action::step);
-    return last != line.actions.rend() && last->kind != ActionKind::duty;
-  };
-  while (step > 0 && is_of_auto(step) && is_of_auto(step - 1)) --step;
+  while (step > 0 && is_of_auto(line, step) && is_of_auto(line, step - 1)) --step;
   return step;
+}
+
+std::optional<Action> duty_in_force(const TimeLine& line, std::size_t step, std::uint64_t tick) {
+  const auto after = std::ranges::upper_bound(line.actions, tick, {}, &Action::tick);
+  if (after == line.actions.begin()) return std::nullopt;
+  const Action& last = *std::prev(after);
+  const bool is_cut = last.step == step && last.kind == ActionKind::duty && last.tick < tick && last.value != 0;
+  return is_cut ? std::optional{Action{tick, ActionKind::duty, last.value, step}} : std::nullopt;
+}
+
+TimeLine rest_of(const TimeLine& line, std::size_t step, std::uint64_t tick) {
+  TimeLine rest = line;
+  std::erase_if(rest.actions, [&](const Action& one) { return one.step < step || one.tick < tick; });
+  const auto in_force = duty_in_force(line, step, tick);
+  if (in_force) rest.actions.insert(rest.actions.begin(), *in_force);
+  for (Action& action : rest.actions) action.tick -= tick;
+  for (std::uint64_t& begin : rest.step_begins) begin = std::max(begin, tick) - tick;
+  rest.ticks -= tick;
+  return rest;
 }
 
 }  // namespace server::experiments

@@ -29,8 +29,9 @@ struct FedCommand {
 
 class CommandFeed {
  public:
-  // From the beginning of a step on. The robot is in manual at duty 0. The line outlives it.
-  CommandFeed(const TimeLine& line, std::size_t first_step, std::uint64_t begins_at_robot_us);
+  // From a tick of a step on, its beginning if none is given. The robot is in manual at duty 0. The line outlives it.
+  CommandFeed(const TimeLine& line, std::size_t first_step, std::uint64_t begins_at_robot_us,
+              std::uint64_t first_tick = 0);
 
   // The next command whose time has come to be sent; none: not now. `robot_now_us` is never ahead of the robot.
   std::optional<FedCommand> next(std::uint64_t robot_now_us);
@@ -69,5 +70,14 @@ class CommandFeed {
 // The first of the steps from which the run can go on after `step` was broken off with the robot at rest in manual: a
 // duty begins by itself, of closed-loop steps that follow each other the first.
 std::size_t step_to_repeat(const TimeLine& line, std::size_t step);
+bool is_of_auto(const TimeLine& line, std::size_t step);
+
+// The duty that is in force at a tick of a step and was set before it; none: another one is set there, or the motor is
+// off.
+std::optional<Action> duty_in_force(const TimeLine& line, std::size_t step, std::uint64_t tick);
+
+// What is left of a line from a tick of a step on, with the duty in force there, as a line of its own with the same
+// steps.
+TimeLine rest_of(const TimeLine& line, std::size_t step, std::uint64_t tick);
 
 }  // namespace server::experiments

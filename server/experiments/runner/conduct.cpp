@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "server/analysis/control_json.hpp"
+#include "server/experiments/preview.hpp"
 #include "server/storage/experiments/experiment_store.hpp"
 
 namespace server::experiments {
@@ -15,6 +16,12 @@ using namespace std::chrono_literals;
 using nlohmann::json;
 
 namespace {
+
+constexpr microseconds kDiskAgain = 1s, kLinkLook = 200ms;
+
+bool may_pass(const Error& error) {
+  return error.code == ErrorCode::unavailable || error.code == ErrorCode::not_connected;
+}
 
 json json_of(const Variant& variant) {
   return {{"fluid", variant.fluid.empty() ? json(nullptr) : json(variant.fluid)},
@@ -112,7 +119,7 @@ asio::awaitable<void> Conduct::one_run(Variant variant) {
   co_await begin_recording(variant, line);
   if (begun_.size() < number_) co_return;  // it did not come to a run
   begins_.clear();
-  const DriveEnd end = co_await drive(std::move(line));
+  const DriveEnd end = co_await drive(of_run_, std::move(line));
   if (end.abort) abort(*end.abort);
   if (!end.abort && end.rest != Rest::at_rest) abort({"not_at_rest", "the robot did not come to rest at its end"});
   co_await end_recording();
@@ -142,10 +149,29 @@ storage::RunConditions Conduct::conditions_of(const Variant& variant) const {
   return conditions;
 }
 
-asio::awaitable<void> Conduct::begin_recording(const Variant& variant, const TimeLine& line) {
+asio::awaitable<Result<storage::Run>> Conduct::create_run(const Variant& variant) {
   auto conditions = conditions_of(variant);
   station::Author by{experiment_.acts_for, peer(), 0};
-  const auto run = co_await parts_.runs.create(experiment_.request.robot_id, std::move(conditions), std::move(by));
+  co_return co_await parts_.runs.create(experiment_.request.robot_id, std::move(conditions), std::move(by));
+}
+
+asio::awaitable<void> Conduct::begin_recording(const Variant& variant, const TimeLine& line) {
+  auto run = co_await create_run(variant);
+  std::int64_t ends_us = parts_.driver.clock.steady_us() + kBackWithin.count();
+  while (!run && may_pass(run.error()) && !abort_) {
+    activity_ = "waiting for the disk, to begin its run";
+    co_await parts_.driver.clock.sleep_for(kDiskAgain);
+    if (parts_.driver.clock.steady_us() > ends_us) {  // SAFETY: nobody knows when it is back, and who is there then
+      is_resumed_ = false;
+      waiting_for_ = Abort{"not_recorded", run.error().detail};
+      co_await await_resumption(kFluidWithin);
+      ends_us = parts_.driver.clock.steady_us() + kBackWithin.count();
+    }
+    co_await await_link();
+    co_await await_actor();
+    if (!abort_) run = co_await create_run(variant);
+  }
+  activity_.clear();
   if (!run) {
     abort({"run_refused", run.error().detail});
     co_return;
@@ -195,8 +221,41 @@ asio::awaitable<std::string> Conduct::predict(const TimeLine& line) {
   co_return co_await parts_.maths.run(std::move(job));
 }
 
-asio::awaitable<DriveEnd> Conduct::drive(TimeLine line) {
-  co_await await_resumption();
+// On the worker. Without a model of the robot's fluid the paper's is taken, as for the prediction.
+asio::awaitable<Result<void>> Conduct::check_travel(Profile profile, TimeLine rest, double position_m) {
+  const station::RobotSettings* settings = parts_.driver.station.settings(experiment_.request.robot_id);
+  const bool has_controller = settings != nullptr && settings->controller;
+  if (!has_controller)
+    co_return fail(ErrorCode::conflict, "what is left cannot be computed: its controller is not known");
+  const auto duty_min = static_cast<double>(settings->controller->duty_min);
+  const auto duty_max = static_cast<double>(settings->controller->duty_max);
+  auto job = [duty_min, duty_max, profile = std::move(profile), rest = std::move(rest), model = model_in_use().model,
+              sections = sections_of(*settings->controller), position_m]() -> Result<void> {
+    try {
+      const Preview left = preview_of(profile, rest, model, sections, duty_min, duty_max, position_m);
+      if (left.problems.empty()) return {};
+      return fail(ErrorCode::conflict, left.problems.front());
+    } catch (const std::invalid_argument& error) {
+      return fail(ErrorCode::conflict, fmt::format("what is left cannot be computed: {}", error.what()));
+    }
+  };
+  co_return co_await parts_.maths.run(std::move(job));
+}
+
+// Also after the link was away: a robot without one comes to rest by itself.
+asio::awaitable<void> Conduct::await_link() {
+  const std::int64_t ends_us = parts_.driver.clock.steady_us() + kBackWithin.count();
+  while (!abort_ && robot().link != station::LinkState::connected) {
+    if (parts_.driver.clock.steady_us() > ends_us) abort({"link_lost", "the link to the robot broke"});
+    co_await changed_.wait_until(parts_.driver.clock, parts_.driver.clock.steady_us() + kLinkLook.count());
+  }
+}
+
+asio::awaitable<DriveEnd> Conduct::drive(const Profile& profile, TimeLine line) {
+  do {  // SAFETY: a pause that comes meanwhile holds it
+    co_await await_resumption();
+    co_await await_link();
+  } while (!abort_ && waiting_for_);
   const bool is_there = experiment_.request.is_unattended || is_actor_there();
   if (!abort_ && is_there) take_control();  // it may have come into other hands meanwhile
   check_robot();
@@ -206,11 +265,15 @@ asio::awaitable<DriveEnd> Conduct::drive(TimeLine line) {
   const station::RobotSettings* settings = parts_.driver.station.settings(request.robot_id);
   const auto limit_s = settings == nullptr ? std::nullopt : settings->parameters.value("auto_limit_s");
   if (limit_s) request.auto_limit = microseconds{static_cast<std::int64_t>(static_cast<double>(*limit_s) * 1e6)};
-  driver_ = std::make_unique<RunDriver>(parts_.driver, std::move(request), life_, profile_.abort, std::move(line));
+  TravelCheck travel_check = [this, profile](TimeLine rest, double position_m) {
+    return check_travel(profile, std::move(rest), position_m);
+  };
+  driver_ = std::make_unique<RunDriver>(parts_.driver, parts_.recorder, std::move(request), life_, profile_.abort,
+                                        std::move(line), std::move(travel_check));
   DriveEnd end = co_await driver_->run();
   begins_ = driver_->step_begins();
   // SAFETY: a pause that came while the robot was brought to rest holds the next run.
-  if (const Abort* why = driver_->pause_reason(); why != nullptr && !is_resumed_) waiting_for_ = *why;
+  if (const Abort* why = driver_->held_by(); why != nullptr && !is_resumed_) waiting_for_ = *why;
   driver_.reset();
   co_return end;
 }
@@ -222,7 +285,10 @@ asio::awaitable<void> Conduct::end_recording() {
   run.reason = abort_ ? abort_->reason : "";
   std::string verdict = abort_ ? fmt::format("aborted: {}", abort_->detail) : "done";
   station::Author by{experiment_.acts_for, peer(), 0};
-  const auto ended = co_await parts_.runs.end(run.run.value_or(0), std::move(verdict), std::move(by));
+  activity_ = "storing the end of its run";
+  const auto ended = co_await parts_.runs.end(run.run.value_or(0), std::move(verdict), std::move(by),
+                                              storage::Runs::Patience::until_stored);
+  activity_.clear();
   if (!ended && run.reason.empty()) run.reason = ended.error().reason;
   run.ended_at_us = parts_.driver.clock.utc_us();
   auto end = [id = experiment_.id, run](storage::Database& database) {
@@ -287,7 +353,7 @@ void Conduct::on_robot(const station::RobotState& robot) {
   if (!driver_) watch_latch(robot);
   if (boot_id_ == 0 || is_in_hands()) return;
   if (robot.boot_id != boot_id_) return abort({"reboot", "the robot has booted again"});
-  if (robot.link != station::LinkState::connected) abort({"link_lost", "the link to the robot broke"});
+  changed_.notify();
 }
 
 void Conduct::on_event(const station::RobotEvent& event) {

@@ -36,6 +36,7 @@ using ControllerByName =
 
 struct ConductParts {
   DriverParts driver;
+  const storage::Recorder& recorder;
   storage::Runs& runs;
   storage::FluidModels& fluid_models;
   StubbornWriter& writer;
@@ -92,11 +93,15 @@ class Conduct {
   boost::asio::awaitable<void> send_controller(std::string name);
   boost::asio::awaitable<void> go_to_start();
   boost::asio::awaitable<void> await_samples_from(std::uint64_t robot_us);
+  boost::asio::awaitable<Result<storage::Run>> create_run(const Variant& variant);
   boost::asio::awaitable<void> begin_recording(const Variant& variant, const TimeLine& line);
   boost::asio::awaitable<std::string> predict(const TimeLine& line);
-  boost::asio::awaitable<DriveEnd> drive(TimeLine line);
+  boost::asio::awaitable<DriveEnd> drive(const Profile& profile, TimeLine line);
+  boost::asio::awaitable<Result<void>> check_travel(Profile profile, TimeLine rest, double position_m);
+  boost::asio::awaitable<void> await_link();
   boost::asio::awaitable<void> end_recording();
-  // The robot time at which it acts; aborts if it is refused.
+  // The robot time at which it acts; aborts if it is refused. One that comes too late to the resting robot is sent
+  // again.
   boost::asio::awaitable<std::uint64_t> submit(const char* what, protocol::Command command, std::string arguments);
   storage::RunConditions conditions_of(const Variant& variant) const;
   ModelInUse model_in_use() const;

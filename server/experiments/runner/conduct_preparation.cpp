@@ -5,8 +5,8 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "server/experiments/limits_check.hpp"
 #include "server/experiments/runner/conduct.hpp"
-#include "server/experiments/runner/limits_check.hpp"
 #include "server/experiments/runner/pump_flow.hpp"
 
 namespace server::experiments {
@@ -16,7 +16,7 @@ using nlohmann::json;
 
 namespace {
 
-constexpr microseconds kLook = 200ms, kModelWithin = 30s, kSamplesWithin = 3s;
+constexpr microseconds kLook = 200ms, kModelWithin = 30s, kSamplesWithin = 3s, kCommandWithin = 10s;
 
 // One setpoint, back to 0.
 Profile way_back() {
@@ -32,6 +32,7 @@ Profile way_back() {
 }  // namespace
 
 asio::awaitable<void> Conduct::prepare(Variant variant) {
+  co_await await_link();
   co_await await_actor();
   if (!abort_) take_control();
   if (!abort_) co_await await_fluid(variant.fluid);
@@ -72,6 +73,7 @@ asio::awaitable<void> Conduct::await_resumption(microseconds limit) {
 void Conduct::check_robot() {
   if (abort_) return;
   if (robot().latched()) return abort({"emergency", "the robot is in emergency"});
+  if (robot().link != station::LinkState::connected) return abort({"link_lost", "the link to the robot broke"});
   if (!is_at_rest(robot())) abort({"robot_not_at_rest", "the robot is not in manual at duty 0"});
 }
 
@@ -101,8 +103,13 @@ void Conduct::take_control() {
 asio::awaitable<void> Conduct::await_fluid(std::string fluid) {
   if (!fluid.empty() && robot().fluid.empty()) {  // it says by it which one the robot is in, as a run does
     const station::Author by{experiment_.acts_for, peer(), parts_.driver.clock.utc_us()};
-    const auto named = parts_.driver.station.set_fluid(experiment_.request.robot_id, fluid, by);
-    if (!named) abort({"fluid", named.error().detail});
+    auto named = parts_.driver.station.set_fluid(experiment_.request.robot_id, fluid, by);
+    if (!named) {  // its lease may have run out just now
+      co_await await_actor();
+      if (!abort_) take_control();
+      if (!abort_) named = parts_.driver.station.set_fluid(experiment_.request.robot_id, fluid, by);
+    }
+    if (!abort_ && !named) abort({"fluid", named.error().detail});
   }
   const std::int64_t ends_us = parts_.driver.clock.steady_us() + kFluidWithin.count();
   while (!abort_ && !fluid.empty() && !robot().fluid.empty() && robot().fluid != fluid) {
@@ -158,22 +165,32 @@ asio::awaitable<void> Conduct::await_model() {
 }
 
 asio::awaitable<std::uint64_t> Conduct::submit(const char* what, protocol::Command command, std::string arguments) {
-  station::CommandRequest request;
-  request.robot_id = experiment_.request.robot_id;
-  request.action = command;
-  request.arguments = std::move(arguments);
-  request.actor = experiment_.acts_for;
-  request.peer = peer();
-  request.answer_grace = station::kOwnAnswerGrace;
-  request.takes_control = false;
-  request.until_verified = command.which_action == rheonaut_Command_set_controller_tag;
-  const auto sent = co_await parts_.driver.station.submit(std::move(request));
-  if (sent && was_accepted(sent->state) && (sent->reason.empty() || sent->state == station::CommandState::verified)) {
-    co_return sent->effect_at_robot_us;
+  const std::int64_t ends_us = parts_.driver.clock.steady_us() + kCommandWithin.count();
+  for (;;) {
+    station::CommandRequest request;
+    request.robot_id = experiment_.request.robot_id;
+    request.action = command;
+    request.arguments = arguments;
+    request.actor = experiment_.acts_for;
+    request.peer = peer();
+    request.answer_grace = station::kOwnAnswerGrace;
+    request.takes_control = false;
+    request.until_verified = command.which_action == rheonaut_Command_set_controller_tag;
+    const auto sent = co_await parts_.driver.station.submit(std::move(request));
+    if (sent && was_accepted(sent->state) && (sent->reason.empty() || sent->state == station::CommandState::verified)) {
+      co_return sent->effect_at_robot_us;
+    }
+    const bool may_pass =
+        sent ? is_late(*sent) : sent.error().code == ErrorCode::unavailable || sent.error().reason == "not_connected";
+    if (may_pass && !abort_ && parts_.driver.clock.steady_us() < ends_us) {
+      co_await parts_.driver.clock.sleep_for(kLook);
+      co_await await_link();
+      if (!abort_) continue;
+    }
+    const std::string why = sent ? fmt::format("{} {}", text(sent->state), sent->reason) : sent.error().detail;
+    abort({"command_refused", fmt::format("{}: {}", what, why)});
+    co_return 0;
   }
-  const std::string why = sent ? fmt::format("{} {}", text(sent->state), sent->reason) : sent.error().detail;
-  abort({"command_refused", fmt::format("{}: {}", what, why)});
-  co_return 0;
 }
 
 asio::awaitable<void> Conduct::send_controller(std::string name) {
@@ -194,7 +211,7 @@ asio::awaitable<void> Conduct::go_to_start() {
   const bool goes_back = profile_.conditions.start == StartPosition::back && number_ > 1;
   if (goes_back) {
     TimeLine line = time_line_of(way_back(), {});
-    const DriveEnd end = co_await drive(std::move(line));
+    const DriveEnd end = co_await drive(way_back(), std::move(line));
     if (end.abort) abort(*end.abort);
     co_return;
   }
@@ -209,8 +226,12 @@ asio::awaitable<void> Conduct::go_to_start() {
 // Samples of before may still be on their way. A run begins behind them, so that one zero holds for all of it: else no
 // position that was measured from outside could be placed in it.
 asio::awaitable<void> Conduct::await_samples_from(std::uint64_t robot_us) {
-  const std::int64_t ends_us = parts_.driver.clock.steady_us() + kSamplesWithin.count();
+  std::int64_t ends_us = parts_.driver.clock.steady_us() + kSamplesWithin.count();
   while (!abort_ && sampled_until_us_ < robot_us) {
+    if (robot().link != station::LinkState::connected) {
+      co_await await_link();
+      ends_us = parts_.driver.clock.steady_us() + kSamplesWithin.count();
+    }
     if (parts_.driver.clock.steady_us() > ends_us) abort({"missing_samples", "no sample of after the zero arrived"});
     co_await changed_.wait_until(parts_.driver.clock, parts_.driver.clock.steady_us() + kLook.count());
   }

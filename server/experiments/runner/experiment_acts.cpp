@@ -3,9 +3,9 @@
 
 #include <algorithm>
 
+#include "server/experiments/limits_check.hpp"
 #include "server/experiments/profile_document.hpp"
 #include "server/experiments/runner/experiments.hpp"
-#include "server/experiments/runner/limits_check.hpp"
 #include "server/runtime/exceptions.hpp"
 #include "server/station/state/audit_note.hpp"
 #include "server/storage/experiments/experiment_store.hpp"
@@ -60,9 +60,13 @@ Result<Experiments::Prepared> Experiments::prepare(const std::string& document, 
 }
 
 Result<void> Experiments::check_request(const storage::ExperimentRequest& request) const {
-  if (parts_.station.find(request.robot_id) == nullptr) {
+  const station::RobotState* robot = parts_.station.find(request.robot_id);
+  if (robot == nullptr) {
     return fail(ErrorCode::not_found, fmt::format("no robot '{}' is known", request.robot_id), "unknown_robot");
   }
+  // It would wait for ever. Of a robot that is away it is not known.
+  if (robot->link == station::LinkState::connected && robot->sample_period_us != kTickUs)
+    return fail(ErrorCode::invalid, "experiments are for robots that sample each 10 ms", "sample_period");
   // SAFETY: an administrator decides whether robots may move while nobody is there.
   if (request.is_unattended && !allow_unattended_) {
     return fail(ErrorCode::forbidden,

@@ -7,7 +7,7 @@
 #include <array>
 #include <string_view>
 
-#include "server/experiments/runner/limits_check.hpp"
+#include "server/experiments/limits_check.hpp"
 #include "server/storage/experiments/experiment_store.hpp"
 
 namespace server::experiments {
@@ -193,8 +193,8 @@ void Experiments::abort_if_reserved(const station::RobotId& robot_id) {
 asio::awaitable<void> Experiments::carry_out(ExperimentId id) {
   Entry& entry = entries_.at(id);
   entry.waits_for.clear();
-  const ConductParts conduct_parts{
-      parts_, recording_.runs, recording_.fluid_models, writer_, maths_, controller_by_name_, fit_of_runs_};
+  const ConductParts conduct_parts{parts_, recording_.recorder, recording_.runs, recording_.fluid_models, writer_,
+                                   maths_, controller_by_name_, fit_of_runs_};
   entry.experiment.started_at_us = parts_.clock.utc_us();
   entry.experiment.state = ExperimentState::running;
   entry.experiment.reason.clear();

@@ -19,41 +19,50 @@ namespace {
 constexpr microseconds kTurn = 20ms;           // between two looks, if no sample comes
 constexpr microseconds kBeginsAfter = 500ms;   // more than kLookAhead
 constexpr microseconds kWrongModeFor = 400ms;  // telemetry comes later than the time of a command
+constexpr microseconds kShortestStall = 2s;    // of recording; a commit on a busy machine takes less
+constexpr microseconds kLatelyWithin = 3s;     // a standstill of this computer explains what is late now
 constexpr double kMmOfOneM = 1e3;
 constexpr microseconds kRenewsEvery = 120ms;  // a lease lasts 500 ms
 
 // Commands of which a run knows nothing, and that change what it measures.
-constexpr std::array<std::string_view, 8> kDisturbing{"set_mode",          "set_setpoint",       "set_duty",
-                                                      "set_duty_schedule", "inject_disturbance", "zero_position",
-                                                      "set_controller",    "restore_controller"};
+constexpr std::array<std::string_view, 9> kDisturbing{"drop_timed",    "set_mode",          "set_setpoint",
+                                                      "set_duty",      "set_duty_schedule", "inject_disturbance",
+                                                      "zero_position", "set_controller",    "restore_controller"};
+
+Abort link_lost() { return {"link_lost", "the link to the robot broke"}; }
 
 }  // namespace
 
-RunDriver::RunDriver(const DriverParts& parts, DriveRequest request, const Life& life, const AbortCriteria& criteria,
-                     TimeLine line)
+RunDriver::RunDriver(const DriverParts& parts, const storage::Recorder& recorder, DriveRequest request,
+                     const Life& life, const AbortCriteria& criteria, TimeLine line, TravelCheck travel_check)
     : parts_{parts},
+      recorder_{recorder},
       request_{std::move(request)},
       life_{life},
       line_{std::move(line)},
       watch_{criteria, parts.clock.steady_us()},
       feed_{line_, 0, 0},
+      travel_check_{std::move(travel_check)},
       changed_{parts.loop} {}
 
 std::uint64_t RunDriver::robot_now_us(const station::RobotState& robot) const {
   return static_cast<std::uint64_t>(station::robot_now_us(robot, parts_.clock));
 }
 
-void RunDriver::begin_at(std::size_t step) {
+void RunDriver::begin_at(Place place) {
   const station::RobotState* robot = parts_.station.find(request_.robot_id);
   begin_generation();
   wrong_mode_since_us_ = 0;
-  next_begin_ = step;
-  feed_ = CommandFeed{line_, step, robot_now_us(*robot) + static_cast<std::uint64_t>(kBeginsAfter.count())};
+  const bool is_its_begin = place.tick <= line_.step_begins.at(place.step);
+  next_begin_ = is_its_begin ? place.step : place.step + 1;
+  feed_ = CommandFeed{line_, place.step, robot_now_us(*robot) + static_cast<std::uint64_t>(kBeginsAfter.count()),
+                      place.tick};
 }
 
 void RunDriver::begin_generation() {
   ++generation_;
   accepted_.clear();
+  generation_robot_us_ = robot_now_us(*parts_.station.find(request_.robot_id));
 }
 
 asio::awaitable<DriveEnd> RunDriver::run() {
@@ -61,10 +70,10 @@ asio::awaitable<DriveEnd> RunDriver::run() {
   if (robot == nullptr) co_return DriveEnd{Abort{"unknown_robot", "the robot is not known"}, Rest::latched};
   boot_id_ = robot->boot_id;
   began_robot_us_ = robot_now_us(*robot);
-  begin_at(0);
+  begin_at({});
   co_await run_until_end();
   begin_generation();
-  const Rest at_the_end = co_await rest();
+  const Rest at_the_end = co_await rest(false);
   co_await settle_tasks();
   co_return DriveEnd{abort_, at_the_end};
 }
@@ -72,7 +81,8 @@ asio::awaitable<DriveEnd> RunDriver::run() {
 asio::awaitable<void> RunDriver::run_until_end() {
   for (;;) {
     const station::RobotState& robot = *parts_.station.find(request_.robot_id);
-    if (auto found = watch_.check(parts_.clock.steady_us())) abort(std::move(*found));
+    if (const auto& found = watch_.fault()) abort(*found);
+    if (!abort_ && !pause_) watch_samples();
     if (!abort_ && !pause_) watch(robot);
     if (abort_) co_return;
     if (pause_) {
@@ -82,27 +92,46 @@ asio::awaitable<void> RunDriver::run_until_end() {
     feed(robot);
     renew_lease();
     note_steps(robot_now_us(robot));
-    if (feed_.is_over(robot_now_us(robot)) && on_their_way_ == 0) co_return;
+    if (feed_.is_over(robot.latest_robot_time_us) && on_their_way_ == 0) co_return;  // as telemetry shows
     co_await changed_.wait_until(parts_.clock, parts_.clock.steady_us() + kTurn.count());
   }
 }
 
 // --- what speaks against going on ---
 
+void RunDriver::watch_samples() {
+  auto late = watch_.late(parts_.clock.steady_us());
+  if (!late) return;
+  if (late->reason == "gap") return interrupt(std::move(*late));
+  abort(std::move(*late));
+}
+
 void RunDriver::watch(const station::RobotState& robot) {
   if (robot.latched()) {
     return abort(
         {"emergency", fmt::format("the robot is in emergency ({})", protocol::text(robot.context.emergency_cause))});
   }
+  if (auto missing = unrecorded(robot)) return pause_for({std::move(*missing), parts_.clock.steady_us()});
   watch_mode(robot);
   watch_actor(robot);
+}
+
+// SAFETY: nothing moves for a record that is not made. The other half of the robot's ring is for the disk to come back.
+std::optional<Abort> RunDriver::unrecorded(const station::RobotState& robot) const {
+  const microseconds half_a_ring{std::int64_t{robot.ring_capacity} * robot.sample_period_us / 2};
+  const microseconds missing = recorder_.not_recording_for();
+  if (missing < std::max(half_a_ring, kShortestStall)) return std::nullopt;
+  const std::string& problem = recorder_.problem();
+  return Abort{"not_recorded",
+               fmt::format("nothing has been recorded for {:.1f} s: {}", static_cast<double>(missing.count()) / 1e6,
+                           problem.empty() ? "the disk does not answer" : problem)};
 }
 
 void RunDriver::watch_mode(const station::RobotState& robot) {
   const std::int64_t now_us = parts_.clock.steady_us();
   const bool lapsed = (robot.context.flags & rheonaut_TELEMETRY_FLAG_LEASE_LAPSED) != 0;
   if (lapsed && feed_.needs_lease(robot.latest_robot_time_us)) {
-    return pause_for({{"lease_lapsed", "the lease of the duty was not renewed in time"}, now_us, false, true});
+    return interrupt({"lease_lapsed", "the lease of the duty was not renewed in time"});
   }
   if (robot.context.mode == feed_.mode_at(robot.latest_robot_time_us)) {
     wrong_mode_since_us_ = 0;
@@ -126,24 +155,35 @@ void RunDriver::watch_actor(const station::RobotState& robot) {
     if (silent_us <= request_.auto_limit.count() && !holder.empty()) return;
     return abort({"unattended_limit", fmt::format("nobody was there for {} s", request_.auto_limit / 1s)});
   }
+  if (holder.empty() && is_fresh()) return abort({"control_changed", "control of the robot was given up"});
   if (silent_us > kAbsence.count() || holder.empty()) {
-    return abort(
+    has_lapsed_ = holder.empty();
+    return interrupt(
         {"nobody_present", fmt::format("{} has given no sign of life for {} s", request_.actor, kAbsence / 1s)});
   }
   const std::uint64_t robot_us = robot_now_us(robot);
   const bool is_driving = feed_.needs_lease(robot_us) || feed_.is_about_to_drive(robot_us);
   if (!is_driving || is_fresh()) return;
-  pause_for({{"nobody_present", fmt::format("{} gives no sign of life", request_.actor)}, now_us, false, true});
+  interrupt({"nobody_present", fmt::format("{} gives no sign of life", request_.actor)});
 }
 
 void RunDriver::on_samples(const station::SampleBatch& batch) {
   watch_.on_samples(batch, parts_.clock.steady_us());
+  const bool is_of_auto = batch.context.mode == rheonaut_MODE_AUTO;
+  for (std::size_t k = 0; k < batch.samples.size(); ++k) {
+    const std::uint64_t made_us = batch.first_robot_time_us + k * batch.context.period_us;
+    if (is_of_auto || batch.samples[k].duty != 0) driven_robot_us_ = std::max(driven_robot_us_, made_us);
+  }
+  // It has come to rest by itself, also where the station has not lost it.
+  const bool was_alone = (batch.context.flags & rheonaut_TELEMETRY_FLAG_LINK_LOSS) != 0;
+  if (was_alone && batch.first_robot_time_us > generation_robot_us_) interrupt(link_lost());
   changed_.notify();
 }
 
 void RunDriver::on_robot(const station::RobotState& robot) {
-  if (boot_id_ != 0 && robot.boot_id != boot_id_) abort({"reboot", "the robot has booted again"});
-  if (boot_id_ != 0 && robot.link != station::LinkState::connected) abort({"link_lost", "the link to the robot broke"});
+  if (boot_id_ == 0) return;
+  if (robot.boot_id != boot_id_) return abort({"reboot", "the robot has booted again"});
+  if (robot.link != station::LinkState::connected) interrupt(link_lost());
 }
 
 std::optional<Abort> disturbance_of(const station::CommandRecord& record, const std::string& peer) {
@@ -163,7 +203,18 @@ void RunDriver::on_command(const station::CommandRecord& record) {
 
 void RunDriver::on_own_command(const station::CommandRecord& record) {
   if (!accepted_.contains(record.id)) return;
-  if (auto fault = fault_of(record)) abort(std::move(*fault));
+  auto fault = fault_of(record);
+  if (!fault) return;
+  if (is_late(record)) return interrupt(came_late(record.kind));
+  abort(std::move(*fault));
+}
+
+// What a late command did not do is done again when the robot has been seen at rest.
+Abort RunDriver::came_late(const std::string& kind) const {
+  const microseconds stood = parts_.clock.watch().stood_still_within(kLatelyWithin, parts_.clock.steady_us());
+  const std::string cause =
+      stood.count() == 0 ? "" : fmt::format(": this computer stood still for {} ms", stood.count() / 1000);
+  return {"command_late", fmt::format("{} came to the robot too late{}", kind, cause)};
 }
 
 // SAFETY: the robot has ended its motion by itself and is in manual, as it was, so that somebody looks; the next step
@@ -224,6 +275,8 @@ asio::awaitable<void> RunDriver::send(FedCommand fed, std::uint64_t robot_now_us
     accepted_.insert(sent->id);
     co_return;
   }
+  const bool is_unheard = sent ? is_late(*sent) : sent.error().reason == "not_connected";
+  if (is_unheard) co_return interrupt(came_late(protocol::kind(fed.command)));
   const std::string why = sent ? sent->reason.empty() ? text(sent->state) : sent->reason : sent.error().detail;
   abort({"command_refused",
          fmt::format("step {}: {}: {}", line_.first_step + fed.step, protocol::kind(fed.command), why)});
@@ -264,77 +317,7 @@ void RunDriver::note_steps(std::uint64_t robot_now_us) {
   }
 }
 
-// --- pauses and the end ---
-
-// SAFETY: also while it is paused by itself: then it does not go on by itself any more.
-void RunDriver::pause(std::string reason, std::string detail) {
-  pause_ = Pause{{std::move(reason), std::move(detail)}, parts_.clock.steady_us()};
-  changed_.notify();
-}
-
-void RunDriver::pause_for(Pause pause) {
-  if (!pause_) pause_ = std::move(pause);
-  changed_.notify();
-}
-
-void RunDriver::resume() {
-  if (pause_) pause_->is_resumed = true;
-  changed_.notify();
-}
-
-asio::awaitable<void> RunDriver::stay_paused() {
-  const station::RobotState& robot = *parts_.station.find(request_.robot_id);
-  const std::size_t broken_off = feed_.step_at(robot_now_us(robot));
-  begin_generation();
-  Rest resting = co_await rest();
-  for (;;) {
-    while (!abort_ && !is_over_pause(*parts_.station.find(request_.robot_id))) {
-      co_await changed_.wait_until(parts_.clock, parts_.clock.steady_us() + kTurn.count());
-    }
-    if (abort_ || resting != Rest::of_another) break;
-    resting = co_await rest();  // it is ours again; SAFETY: a pause that comes meanwhile holds it
-  }
-  if (!abort_ && resting != Rest::at_rest) abort({"emergency", "the robot is in emergency"});
-  if (!abort_ && ++repeats_ > kMostRepeats) {
-    abort({"too_many_repeats", fmt::format("steps were broken off {} times", repeats_)});
-  }
-  pause_.reset();
-  if (!abort_) begin_at(step_to_repeat(line_, broken_off));
-}
-
-void RunDriver::check_pause_limit() {
-  const std::int64_t paused_us = parts_.clock.steady_us() - pause_->since_us;
-  const bool is_of_control = pause_->why.reason == "control_changed";
-  const microseconds limit = pause_->ends_by_itself ? kAbsence : is_of_control ? kTakeOverWithin : kLongestPause;
-  if (paused_us <= limit.count()) return;
-  if (pause_->ends_by_itself || is_of_control) return abort(pause_->why);
-  abort({"paused_too_long", fmt::format("it was paused for {} s", limit / 1s)});
-}
-
-// SAFETY: it goes on only for somebody who is there now, and in control.
-bool RunDriver::is_over_pause(const station::RobotState& robot) {
-  if (auto found = watch_.check(parts_.clock.steady_us())) abort(std::move(*found));
-  if (robot.latched()) abort({"emergency", "the robot is in emergency"});
-  check_pause_limit();
-  if (abort_) return true;
-  const bool may_go_on = pause_->ends_by_itself || pause_->is_resumed;
-  return may_go_on && is_in_control() && (is_fresh() || request_.is_unattended);
-}
-
-bool RunDriver::is_in_control() const {
-  return parts_.station.holder(request_.robot_id) == request_.actor &&
-         parts_.station.is_kept_by(request_.robot_id, {request_.actor, request_.client});
-}
-
-asio::awaitable<Rest> RunDriver::rest() {
-  RestRequest wanted{request_.robot_id, request_.actor, request_.peer};
-  co_return co_await bring_to_rest(parts_.station, parts_.clock, std::move(wanted));
-}
-
-// They end by themselves, since every command has a time to live; nothing of theirs is left when this returns.
-asio::awaitable<void> RunDriver::settle_tasks() {
-  while (on_their_way_ > 0) co_await parts_.clock.sleep_for(kTurn);
-}
+// --- its state ---
 
 double RunDriver::elapsed_s() const {
   const station::RobotState* robot = parts_.station.find(request_.robot_id);

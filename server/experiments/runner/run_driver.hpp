@@ -3,9 +3,14 @@
 //   run() → starting → running ⇄ paused → at rest, and the way it ended
 //
 // SAFETY: it acts in the name of an actor, and is no sign of life itself. A duty in manual is renewed only while the
-// client in whose hands the experiment is gives fresh ones for it; without them the robot is brought to rest, and the
-// step is repeated when the client is back within kAbsence, or the run ends. Whatever ends a run, the robot is at rest,
-// or in emergency, or somebody else's, when run() returns.
+// client in whose hands the experiment is gives fresh ones for it; without them the robot is brought to rest. Whatever
+// ends a run, the robot is at rest, or in emergency, or somebody else's, when run() returns.
+//
+// Interrupted: the link, a command, samples or a sign of life was late. The robot is at rest, and the run goes on when
+// the same boot is back within kBackWithin, was seen at rest since then, its client has given a sign of life since
+// that, and kCountDown has passed; a pause by a person ends that. A duty goes on at the tick where it was broken off,
+// closed-loop steps begin again; what is left must keep within the limits from where the robot is. Not of an unattended
+// one, and never after a stop, a latch, a limit, a taken control or another boot.
 //
 // The owner passes the station's reports on. Loop thread; what it is given outlives it, and so does it its own tasks:
 // run() has returned, or the loop has ended.
@@ -13,6 +18,8 @@
 
 #include <boost/asio/awaitable.hpp>
 #include <cstdint>
+#include <functional>
+#include <map>
 #include <optional>
 #include <set>
 #include <string>
@@ -24,13 +31,18 @@
 #include "server/experiments/runner/robot_rest.hpp"
 #include "server/runtime/tasks.hpp"
 #include "server/station/station.hpp"
+#include "server/storage/ingest/recorder.hpp"
 
 namespace server::experiments {
 
-inline constexpr microseconds kAbsence{3'000'000};          // of a page that is loaded again
+inline constexpr microseconds kAbsence{3'000'000};          // in closed loop, without a sign of life
+inline constexpr microseconds kBackWithin{10'000'000};      // after an interruption: link and client
+inline constexpr microseconds kCountDown{3'000'000};        // before it goes on by itself
 inline constexpr microseconds kLongestPause{600'000'000};   // by a person
 inline constexpr microseconds kTakeOverWithin{60'000'000};  // after control has gone to somebody else
-inline constexpr int kMostRepeats = 5;                      // of steps, in one run
+inline constexpr int kMostBegins = 5;                       // of a closed-loop step, in one run
+// Of a step that goes on, interruptions: one for each so many seconds of its length, and kMostBegins in any case.
+inline constexpr double kInterruptedEvery_s = 5;
 
 // What the driver works with; outlives it.
 struct DriverParts {
@@ -60,19 +72,22 @@ struct StepBegin {
   std::uint64_t robot_time_us = 0;
 };
 
+// Whether what is left of a line keeps within its limits from this position; or why not, or why that cannot be told.
+using TravelCheck = std::function<boost::asio::awaitable<Result<void>>(TimeLine rest, double position_m)>;
+
 // What somebody else's command to the robot means for a run; `peer` is that of the run's own commands. None: nothing.
 std::optional<Abort> disturbance_of(const station::CommandRecord& record, const std::string& peer);
 
 class RunDriver {
  public:
-  // The robot is at rest, and the actor controls it.
-  RunDriver(const DriverParts& parts, DriveRequest request, const Life& life, const AbortCriteria& criteria,
-            TimeLine line);
+  // The robot is at rest, and the actor controls it. `recorder` has its samples.
+  RunDriver(const DriverParts& parts, const storage::Recorder& recorder, DriveRequest request, const Life& life,
+            const AbortCriteria& criteria, TimeLine line, TravelCheck travel_check);
 
   boost::asio::awaitable<DriveEnd> run();  // returns when no task of its own is left
 
   // --- by people ---
-  void pause(std::string reason, std::string detail);  // until resume(); kLongestPause at most
+  void pause(std::string reason, std::string detail);  // until resume(); kLongestPause at most; ends a count-down
   void resume();
   void abort(Abort why);
   void set_client(const station::Client& client) {
@@ -89,27 +104,48 @@ class RunDriver {
   boost::asio::awaitable<void> settle_tasks();
 
   bool is_paused() const { return pause_.has_value(); }
-  const Abort* pause_reason() const { return pause_ ? &pause_->why : nullptr; }
+  const Abort* pause_reason() const { return pause_ ? &pause_->shown : nullptr; }
+  // By a person, or until one comes.
+  const Abort* held_by() const { return pause_ && !pause_->ends_by_itself ? &pause_->why : nullptr; }
   double elapsed_s() const;  // of the line
   std::size_t step() const;  // that runs now, of the line from 0
   double duration_s() const { return line_.duration_s(); }
   const std::vector<StepBegin>& step_begins() const { return begins_; }
 
  private:
+  static constexpr microseconds kTurn{20'000};  // between two looks, if no sample comes
+
   struct Pause {
+    Pause(Abort of, std::int64_t now_us, bool by_itself = false)
+        : why{std::move(of)}, shown{why}, since_us{now_us}, ends_by_itself{by_itself} {}
+
     Abort why;
+    Abort shown;                // with the count-down
     std::int64_t since_us = 0;  // steady
     bool is_resumed = false;
-    bool ends_by_itself = false;  // when the actor is back
+    bool ends_by_itself = false;     // an interruption
+    std::int64_t goes_on_at_us = 0;  // steady; 0: not yet
+  };
+
+  // Where the line was broken off.
+  struct Place {
+    std::size_t step = 0;
+    std::uint64_t tick = 0;
   };
 
   boost::asio::awaitable<void> run_until_end();
   boost::asio::awaitable<void> stay_paused();
-  boost::asio::awaitable<Rest> rest();
+  boost::asio::awaitable<void> until_over_pause(std::uint64_t noticed_us);
+  boost::asio::awaitable<void> check_travel(Place place);
+  boost::asio::awaitable<Rest> rest(bool ends_with_link);
+  void go_on_from(Place place);
+  void count_interruption(Place place, std::int64_t since_us);
+  Place broken_off(std::uint64_t noticed_us) const;
   void spawn(boost::asio::awaitable<void> task);
   void on_own_command(const station::CommandRecord& record);
+  std::optional<Abort> unrecorded(const station::RobotState& robot) const;
   void begin_generation();
-  void begin_at(std::size_t step);
+  void begin_at(Place place);
   void watch(const station::RobotState& robot);
   void watch_mode(const station::RobotState& robot);
   void watch_actor(const station::RobotState& robot);
@@ -119,14 +155,22 @@ class RunDriver {
   boost::asio::awaitable<void> send(FedCommand fed, std::uint64_t robot_now_us);
   boost::asio::awaitable<void> send_renewal(microseconds time_to_live);
   station::CommandRequest request_of(const protocol::Command& command) const;
+  void interrupt(Abort why);
   void pause_for(Pause pause);
-  bool is_over_pause(const station::RobotState& robot);
+  bool is_over_pause(const station::RobotState& robot, bool is_seen);
+  bool counts_down();
+  void note_away(std::int64_t since_us);
+  void watch_samples();
+  Abort came_late(const std::string& kind) const;
   void check_pause_limit();
   bool is_in_control() const;  // its client
+  bool has_control_again();
+  void watch_control();
   bool is_fresh() const { return life_.is_fresh(parts_.clock.steady_us()); }
   std::uint64_t robot_now_us(const station::RobotState& robot) const;
 
   const DriverParts parts_;
+  const storage::Recorder& recorder_;
   DriveRequest request_;
   const Life& life_;  // of the experiment
   TimeLine line_;
@@ -134,16 +178,22 @@ class RunDriver {
   CommandFeed feed_;
   std::optional<Abort> abort_;
   std::optional<Pause> pause_;
+  const TravelCheck travel_check_;
   std::vector<StepBegin> begins_;
   std::size_t next_begin_ = 0;  // step whose beginning is noted next
   station::BootId boot_id_ = 0;
   std::uint64_t began_robot_us_ = 0;
   std::int64_t wrong_mode_since_us_ = 0;  // steady; 0: it is as it is to be
   std::int64_t renewed_at_us_ = 0;
-  int repeats_ = 0;
-  int generation_ = 0;                     // of what was sent: a pause ends one
-  std::set<station::CommandId> accepted_;  // commands of this generation that wait on the robot, or have acted
-  int on_their_way_ = 0;                   // tasks of its own
+  std::map<std::size_t, int> interruptions_;  // of each step
+  std::int64_t interrupted_us_ = 0;           // in all
+  bool has_lapsed_ = false;                   // control, with the signs of life of its client
+  std::int64_t rested_at_us_ = 0;             // steady: seen at rest, in a pause
+  std::uint64_t generation_robot_us_ = 0;     // when it began
+  std::uint64_t driven_robot_us_ = 0;         // latest sample of this boot with the motor on, or in auto
+  int generation_ = 0;                        // of what was sent: a pause ends one
+  std::set<station::CommandId> accepted_;     // commands of this generation that wait on the robot, or have acted
+  int on_their_way_ = 0;                      // tasks of its own
   bool is_renewing_ = false;
   runtime::Signal changed_;
 };

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 #include <sqlite3.h>
+#include <stdexcept>
 
 #include "server/runtime/exceptions.hpp"
 
@@ -24,9 +25,12 @@ constexpr int kRestartTryMs = 20;  // with the line above, one second
 constexpr microseconds kHeldPatience = 5s;
 constexpr microseconds kWarningInterval = 10s;
 
-CheckpointOutcome make_pass(const std::filesystem::path& path) {
+CheckpointOutcome make_pass(const std::filesystem::path& path, const std::function<bool()>& names_hold) {
+  constexpr const char* kLostNames = "the files of the database have lost their names";
   try {
+    if (!names_hold()) throw std::runtime_error{kLostNames};
     SQLite::Database database{path.string(), SQLite::OPEN_READWRITE};
+    if (!names_hold()) throw std::runtime_error{kLostNames};   // it has read nothing yet
     database.exec("PRAGMA synchronous = FULL");                // as the log must be synced before the file is written
     database.execAndGet("SELECT value FROM meta").getInt64();  // opens the log
     return checkpoint(database, CheckpointMode::passive);
@@ -78,7 +82,7 @@ asio::awaitable<void> Checkpointer::run() {
     is_passing_ = true;
     const std::uint64_t commits = commits_;
     next_pass_us_ = clock_.steady_us() + interval_.count();
-    auto pass = [path = path_] { return make_pass(path); };
+    auto pass = [path = path_, names_hold = names_hold_] { return make_pass(path, names_hold); };
     const CheckpointOutcome outcome = co_await worker_.run(std::move(pass));
     note(outcome);
     const bool moved_all = !outcome.is_busy && outcome.problem.empty() && outcome.moved_frames >= outcome.log_frames;

@@ -21,7 +21,9 @@
 #include <boost/asio/io_context.hpp>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <string>
+#include <utility>
 
 #include "server/runtime/clock.hpp"
 #include "server/runtime/worker.hpp"
@@ -56,6 +58,11 @@ class Checkpointer {
  public:
   Checkpointer(boost::asio::io_context& loop, runtime::Clock& clock, runtime::WorkerThread& worker,
                std::filesystem::path path, std::uint64_t checkpoint_bytes, microseconds interval);
+
+  // SAFETY: whether the names of the database lead to the files that the station has open; asked on the worker before
+  // and after a pass opens it by its name. With another file there a pass would damage both.
+  void set_names_hold(std::function<bool()> names_hold) { names_hold_ = std::move(names_hold); }
+  const std::function<bool()>& names_hold() const { return names_hold_; }
 
   // Makes the passes, until cancelled.
   boost::asio::awaitable<void> run();
@@ -92,6 +99,7 @@ class Checkpointer {
   runtime::Signal pass_ended_;
   runtime::Signal committed_;
 
+  std::function<bool()> names_hold_ = [] { return true; };
   WalState state_;
   std::uint64_t commits_ = 0;         // that have gone into the log
   std::uint64_t passed_commits_ = 0;  // are in the database, too, and maybe more

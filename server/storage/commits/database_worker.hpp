@@ -19,6 +19,7 @@
 #include "server/station/state/robot_archive.hpp"
 #include "server/station/state/station_state.hpp"
 #include "server/storage/commits/checkpointer.hpp"
+#include "server/storage/database/kept_files.hpp"
 
 namespace server::storage {
 
@@ -39,8 +40,9 @@ struct OpenedDatabase {
 
 class DatabaseWorker {
  public:
-  DatabaseWorker(runtime::WorkerThread& disk, Checkpointer& checkpointer, std::filesystem::path path)
-      : disk_{disk}, checkpointer_{checkpointer}, path_{std::move(path)} {}
+  DatabaseWorker(runtime::WorkerThread& disk, Checkpointer& checkpointer, std::filesystem::path path,
+                 RescuePlace rescue = {})
+      : disk_{disk}, checkpointer_{checkpointer}, path_{std::move(path)}, rescue_{std::move(rescue)} {}
 
   // Opens or creates the database; before everything else. Throws when the file is not ours or cannot be written.
   boost::asio::awaitable<OpenedDatabase> open(std::int64_t utc_us);
@@ -52,12 +54,19 @@ class DatabaseWorker {
     LogReport report{checkpointer_};
     auto with_database = [this, &report, job = std::move(job)]() mutable {
       const LogReport::Reading reading{report.use, *store_};
+      struct Look {
+        DatabaseWorker& worker;
+        std::uint64_t commits;
+        ~Look() { worker.look_after(commits); }
+      };
+      const Look look{*this, store_->log_use().commits};
       return job(*database_);
     };
     co_return co_await disk_.run(std::move(with_database));
   }
 
-  // Returns the problem, empty when the commit is durable. It must stay as it is meanwhile.
+  // Returns the problem, empty when the commit is durable in files that have their names. It must stay as it is until
+  // then.
   boost::asio::awaitable<std::string> write(const WriteBatch& commit);
 
   // After the loop has ended: the same in this thread; `last` has the database to itself; then the audit gets its last
@@ -87,12 +96,16 @@ class DatabaseWorker {
   };
 
   OpenedDatabase open_now(std::int64_t utc_us);
+  void look_after(std::uint64_t commits_before);
 
   runtime::WorkerThread& disk_;
   Checkpointer& checkpointer_;
   std::filesystem::path path_;
+  RescuePlace rescue_;
+  std::shared_ptr<KeptFiles> kept_;     // shared with whoever may open the database by its name
   std::unique_ptr<Database> database_;  // used by jobs; by close() when no job can be under way
   std::unique_ptr<SampleStore> store_;
+  bool is_written_ = false;  // the commit, but its files have lost their names
 };
 
 }  // namespace server::storage

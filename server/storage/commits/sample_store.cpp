@@ -43,7 +43,8 @@ constexpr const char* kInsertEvent =
 
 bool WriteBatch::empty() const {
   return new_boots.empty() && segments.empty() && gaps.empty() && events.empty() && event_gaps.empty() &&
-         audit.empty() && commands.empty() && clocks.empty() && in_force.empty() && fluids.empty() && boots.empty();
+         audit.empty() && commands.empty() && clocks.empty() && in_force.empty() && fluids.empty() && boots.empty() &&
+         changes.empty();
 }
 
 SampleStore::SampleStore(Database& database)
@@ -98,6 +99,7 @@ void SampleStore::write(const WriteBatch& batch) {
     execute(advance_boot_, boot.durable_next_seq, boot.durable_next_event_seq, boot.last_robot_time_us, boot.boot_key);
   }
   for (const BootStart& boot : batch.boots) boots_.start(boot);
+  for (const Change& change : batch.changes) change.apply(database_);
   if (next_row != next_row_ && execute(advance_row_, next_row, next_row_) != 1) {
     throw std::runtime_error{"another program writes into the station's database; stop it"};
   }

@@ -7,6 +7,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <string>
 #include <vector>
@@ -35,6 +36,14 @@ struct StoredInForce {
   station::InForceRecord record;
 };
 
+// What another part has stored in order with the samples: after all that was received before it, before all that was
+// received after it.
+struct Change {
+  std::function<void(Database&)>
+      apply;                     // on the disk thread; again while the commit fails, so only the disk may fail it
+  std::function<void()> stored;  // on the loop, once it is durable
+};
+
 // In one transaction at most.
 inline constexpr std::size_t kMaxCommitSamples = 200'000;
 
@@ -51,7 +60,8 @@ struct WriteBatch {
   std::vector<StoredInForce> in_force;
   std::map<station::RobotId, std::string> fluids;  // that robots are in from now on; empty: not known
   std::vector<BootProgress> progress;              // of each boot that any of this belongs to
-  std::vector<BootStart> boots;                    // applied last: they end the robots' earlier boots
+  std::vector<BootStart> boots;                    // applied behind all that: they end the robots' earlier boots
+  std::vector<Change> changes;                     // applied last
 
   bool empty() const;
 };

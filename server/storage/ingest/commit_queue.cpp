@@ -51,6 +51,7 @@ void CommitQueue::build_commit(BootsWithRecords& with_records) {
   move_gaps(with_records);
   move_segments();
   move_starts();
+  move_changes();
   for (const BootEntry* boot = in_commit_.first(); boot != nullptr; boot = in_commit_.after(*boot)) {
     commit_.progress.push_back(boot->recording.progress());
   }
@@ -83,6 +84,13 @@ void CommitQueue::move_starts() {
     commit_.boots.push_back(std::move(starts_.front().start));
     starting_.push_back(starts_.front().boot);
     starts_.pop_front();
+  }
+}
+
+void CommitQueue::move_changes() {
+  while (!changes_.empty() && changes_.front().after <= left_) {
+    commit_.changes.push_back(std::move(changes_.front().change));
+    changes_.pop_front();
   }
 }
 

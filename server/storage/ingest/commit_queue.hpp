@@ -5,7 +5,8 @@
 //
 // A commit has every queued record, and segments in the order in which they were enqueued, up to kMaxCommitSamples; the
 // rest goes in its turn with the next ones. A start of a boot waits until the segments that were enqueued before it are
-// in a commit. Samples count as queued from receipt, while they still wait in their boot, until they are stored.
+// in a commit, a change of another part until such starts are. Samples count as queued from receipt, while they still
+// wait in their boot, until they are stored.
 //
 // Loop thread only; owned by the Recorder. Plain bookkeeping: no clock, no database. Only commit() is read elsewhere,
 // by the disk thread while it writes it. The entries of boots outlive what is queued of them: BootEntry::is_listed().
@@ -60,8 +61,11 @@ class CommitQueue {
   // Takes the place of one that is queued of the same boot.
   void enqueue_start(BootEntry& boot, BootStart start);
 
+  // It goes with the first commit that has all samples and starts that were received before it.
+  void enqueue(Change change) { changes_.push_back({std::move(change), end_of_starts()}); }
+
   // Nothing is queued but segments.
-  bool has_no_records() const { return queued_.empty(); }
+  bool has_no_records() const { return queued_.empty() && changes_.empty(); }
 
   // Makes the next commit of what is queued and of the gaps and events of these boots. There must be no commit.
   void build_commit(BootsWithRecords& with_records);
@@ -100,9 +104,15 @@ class CommitQueue {
     QueuePosition after = 0;
   };
 
+  struct QueuedChange {
+    Change change;
+    QueuePosition after = 0;
+  };
+
   void move_gaps(BootsWithRecords& with_records);
   void move_segments();
   void move_starts();
+  void move_changes();
 
   std::size_t max_samples_;
   std::size_t max_records_;
@@ -113,6 +123,7 @@ class CommitQueue {
   std::deque<QueuedSegment> segments_;
   std::size_t segment_samples_ = 0;  // of segments_
   std::deque<QueuedStart> starts_;
+  std::deque<QueuedChange> changes_;
   QueuePosition enqueued_ = 0;
   QueuePosition left_ = 0;
 

@@ -36,7 +36,7 @@ Recorder::Recorder(asio::io_context& loop, runtime::Clock& clock, runtime::Worke
       clock_{clock},
       options_{std::move(options)},
       checkpointer_{loop, clock, checkpoints, options_.path, options_.checkpoint_bytes, options_.checkpoint_interval},
-      database_{disk, checkpointer_, options_.path},
+      database_{disk, checkpointer_, options_.path, options_.rescue},
       admission_{loop, [this](std::vector<AdmissionQuestion> all) { return ask_database(std::move(all)); }},
       boots_{std::make_unique<BootRegistry>()},
       queue_{std::make_unique<CommitQueue>(options_.max_queued_samples, options_.max_queued_records)},
@@ -56,6 +56,7 @@ asio::awaitable<RestoredState> Recorder::open() {
 asio::awaitable<void> Recorder::run() {
   for (;;) {
     co_await wait_for_commit();
+    if (committing_since_us_ == 0) committing_since_us_ = clock_.steady_us();
     co_await checkpointer_.wait_for_room();
     if (!queue_->has_commit()) build_commit();  // or the same content, until it is stored
     co_await write();
@@ -64,6 +65,7 @@ asio::awaitable<void> Recorder::run() {
     if (failing()) continue;
     flushes_.on_durable(queue_->position());
     co_await finish_checkpoint();
+    committing_since_us_ = 0;
     co_await ask_for_missing();
   }
 }
@@ -103,6 +105,7 @@ asio::awaitable<void> Recorder::write() {
   WriteBatch written = queue_->finish_commit();
   const bool had_samples = counters_.samples_written > 0;
   counters_.count_written(written);
+  for (const Change& change : written.changes) change.stored();
   if (!had_samples && counters_.samples_written > 0) checkpointer_.pass_at_once();
   co_await report_durable(std::move(written.progress));
 }
@@ -222,6 +225,15 @@ void Recorder::record_left_out(bool at_once) {
     note.detail = fmt::format(R"({{"count":{}}})", count);
     queue_->enqueue(std::move(note));
   }
+}
+
+void Recorder::store(Change change) {
+  queue_->enqueue(std::move(change));
+  wake();
+}
+
+microseconds Recorder::not_recording_for() const {
+  return microseconds{committing_since_us_ == 0 ? 0 : clock_.steady_us() - committing_since_us_};
 }
 
 void Recorder::watch(BootEntry& boot) {

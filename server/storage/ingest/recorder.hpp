@@ -59,6 +59,7 @@ struct RecorderOptions {
   std::size_t max_queued_records = 100'000;   // events, commands, audit, clock estimates, texts in force
   std::uint64_t checkpoint_bytes = 64 << 20;  // of the write-ahead log, from which on it is moved into the database
   microseconds checkpoint_interval = std::chrono::seconds{10};  // after which a shorter one is moved, too
+  RescuePlace rescue{};                                         // of a database whose files were taken away
   microseconds head_interval = std::chrono::seconds{2};         // between two looks whether the head has changed
 };
 
@@ -151,6 +152,10 @@ class Recorder final : public station::StationSink, public station::RobotArchive
   boost::asio::awaitable<bool> flush_records();  // events, commands and boots
   boost::asio::awaitable<bool> flush_boots();    // boots and the spans that they moved; nothing is written if none wait
 
+  // Stored with the next commit, however often that fails: what was received before it is stored no later, and what is
+  // received after it no sooner.
+  void store(Change change);
+
   // After the loop has ended: writes and commits everything left, or logs what could not be written; then `last` has
   // the database to itself. Does not throw.
   void close(const std::function<void(Database&, std::int64_t utc_us)>& last = {});
@@ -198,12 +203,17 @@ class Recorder final : public station::StationSink, public station::RobotArchive
   std::vector<Segment> waiting(station::BootId boot_id, Interval samples, std::size_t limit = kAll) const;
   std::vector<LostRange> waiting_gaps(station::BootId boot_id, Interval samples) const;
 
+  // Whether the database may be opened by its name now; any thread.
+  const std::function<bool()>& names_hold() const { return checkpointer_.names_hold(); }
+
   boost::asio::io_context& loop() { return loop_; }
   const std::filesystem::path& path() const { return options_.path; }
   const RecorderCounters& counters() const { return counters_; }
   std::size_t queued_samples() const;
   // The last commit failed: nothing becomes durable now.
   bool failing() const { return failure_.is_failing(); }
+  // For how long a commit has been tried, or waited for; 0 while there is none.
+  microseconds not_recording_for() const;
   // The disk fails, or commits are late, or the write-ahead log is large: what can wait makes room for commits.
   bool is_behind() const { return failing() || queued_samples() > 500'000 || wal().bytes > 96'000'000; }
   std::size_t flushes() const { return flushes_.size(); }  // who waits for a commit
@@ -255,6 +265,7 @@ class Recorder final : public station::StationSink, public station::RobotArchive
   RecorderCounters counters_;
   std::vector<ReturnedSamples> returned_;  // not reported yet
   std::int64_t last_commit_us_ = 0;        // steady
+  std::int64_t committing_since_us_ = 0;   // steady; 0: no commit is under way
   std::int64_t overflow_logged_us_ = 0;    // steady
   bool idle_ = false;                      // run() waits for work_
   runtime::Signal work_{loop_};            // something to record, or a robot to watch

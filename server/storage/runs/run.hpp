@@ -12,6 +12,8 @@
 
 namespace server::storage {
 
+inline constexpr std::size_t kMaxRunTextBytes = 10'000;  // of each text but its name
+
 using RunId = std::int64_t;
 
 enum class RunState : std::uint8_t {

@@ -111,6 +111,23 @@ class RunReading {
 
 }  // namespace
 
+const char* text(RunState value) {
+  switch (value) {
+    case RunState::open: return "open";
+    case RunState::ended: return "ended";
+    case RunState::interrupted: return "interrupted";
+    case RunState::discarded: return "discarded";
+  }
+  return "open";
+}
+
+std::optional<RunState> run_state_from(const std::string& name) {
+  for (const RunState state : {RunState::open, RunState::ended, RunState::interrupted, RunState::discarded}) {
+    if (name == text(state)) return state;
+  }
+  return std::nullopt;
+}
+
 std::optional<Run> find_run(SQLite::Database& database, const BootHeads& heads, RunId id) {
   SQLite::Statement query{database, fmt::format("SELECT {} FROM run WHERE run_id = ?", kRunColumns)};
   bind_all(query, id);
@@ -200,6 +217,12 @@ std::optional<RunSnapshot> read_snapshot(SQLite::Database& database, RunId id) {
                                  unsigned_id(rows.getColumn(2)), rows.getColumn(3).getString()});
   }
   return snapshot;
+}
+
+std::uint64_t known_next_seq(SQLite::Database& database, station::BootId boot_id) {
+  SQLite::Statement key{database, "SELECT boot_key FROM boot WHERE boot_id = ?"};
+  bind_all(key, boot_id);
+  return key.executeStep() ? known_next_seq(database, {}, key.getColumn(0).getInt64(), boot_id) : 0;
 }
 
 std::uint64_t known_next_seq(SQLite::Database& database, const BootHeads& heads, std::int64_t boot_key,

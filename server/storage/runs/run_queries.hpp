@@ -42,6 +42,7 @@ std::vector<RunId> interrupted_since_start(SQLite::Database& database);
 std::optional<RunSnapshot> read_snapshot(SQLite::Database& database, RunId id);
 
 // One above the newest sample that the boot is known to have made.
+std::uint64_t known_next_seq(SQLite::Database& database, station::BootId boot_id);  // 0: there is no such boot
 std::uint64_t known_next_seq(SQLite::Database& database, const BootHeads& heads, std::int64_t boot_key,
                              station::BootId boot_id);
 

@@ -52,18 +52,26 @@ RunId RunStore::insert(const Run& run) {
   return handle_.getLastInsertRowid();
 }
 
-void RunStore::end(RunId id, const std::string& verdict, const std::string& station_document,
-                   const station::Author& by) {
-  SQLite::Transaction transaction{handle_, SQLite::TransactionBehavior::IMMEDIATE};
-  close_span(id);
+void RunStore::end(RunId id, const RunEnd& end) {
+  SQLite::Statement of_boot{handle_,
+                            "SELECT span, boot_key FROM run_span JOIN boot USING (boot_key)"
+                            " WHERE run_id = ? AND boot_id = ? ORDER BY span DESC LIMIT 1"};
+  bind_all(of_boot, id, end.boot_id);
+  if (of_boot.executeStep()) {
+    const std::int64_t span = of_boot.getColumn(0).getInt64(), boot_key = of_boot.getColumn(1).getInt64();
+    of_boot.reset();
+    close_span(id, span, boot_key, end.next_seq);
+  } else {
+    close_open_span(id);
+  }
   SQLite::Statement mark{
       handle_,
       "UPDATE run SET ended_at_us = ?2, state = 'ended', verdict = CASE ?3 WHEN '' THEN verdict ELSE ?3 END"
       " WHERE run_id = ?1"};
-  execute(mark, id, by.at_us, verdict);
-  put_in_force(id, station_document, by.at_us);  // in the spans that reboots have begun
-  note_in_audit(id, robot_of(handle_, id), "run.ended", {{"verdict", verdict.substr(0, kMaxNotedVerdictBytes)}}, by);
-  transaction.commit();
+  execute(mark, id, end.by.at_us, end.verdict);
+  put_in_force(id, end.station_document, end.by.at_us);  // in the spans that reboots have begun
+  const std::string noted = end.verdict.substr(0, kMaxNotedVerdictBytes);
+  note_in_audit(id, robot_of(handle_, id), "run.ended", {{"verdict", noted}}, end.by);
 }
 
 std::vector<RunId> RunStore::interrupt(std::int64_t utc_us) {
@@ -76,7 +84,7 @@ std::vector<RunId> RunStore::interrupt(std::int64_t utc_us) {
   SQLite::Statement mark{
       handle_, "UPDATE run SET ended_at_us = max(started_at_us, ?2), state = 'interrupted' WHERE run_id = ?1"};
   for (const RunId id : open) {
-    close_span(id);
+    close_open_span(id);
     bind_all(last_span, id);
     std::optional<SampleTime> last;
     if (last_span.executeStep()) {
@@ -101,23 +109,30 @@ void RunStore::note_in_audit(RunId id, const station::RobotId& robot_id, const c
   AuditChain{handle_}.append(note);
 }
 
-void RunStore::close_span(RunId id) {
+void RunStore::close_open_span(RunId id) {
   SQLite::Statement open{handle_,
-                         "SELECT run_span.boot_key, boot.boot_id FROM run_span JOIN boot USING (boot_key)"
+                         "SELECT span, boot_key, boot.boot_id FROM run_span JOIN boot USING (boot_key)"
                          " WHERE run_id = ? AND last_seq IS NULL"};
   bind_all(open, id);
   if (!open.executeStep()) return;
-  const std::int64_t boot_key = open.getColumn(0).getInt64();
-  const std::uint64_t next = known_next_seq(handle_, heads_, boot_key, unsigned_id(open.getColumn(1)));
+  const std::int64_t span = open.getColumn(0).getInt64(), boot_key = open.getColumn(1).getInt64();
+  const std::uint64_t next = known_next_seq(handle_, {}, boot_key, unsigned_id(open.getColumn(2)));
   open.reset();
-  SQLite::Statement drop{handle_, "DELETE FROM run_span WHERE run_id = ? AND last_seq IS NULL AND first_seq >= ?"};
-  execute(drop, id, next);
-  SQLite::Statement close{handle_, "UPDATE run_span SET last_seq = ?2 - 1 WHERE run_id = ?1 AND last_seq IS NULL"};
-  execute(close, id, next);
+  close_span(id, span, boot_key, next);
+}
+
+void RunStore::close_span(RunId id, std::int64_t span, std::int64_t boot_key, std::uint64_t next_seq) {
+  SQLite::Statement drop{handle_,
+                         "DELETE FROM run_span WHERE run_id = ?1 AND (span > ?2 OR span = ?2 AND first_seq >= ?3)"};
+  execute(drop, id, span, next_seq);
+  SQLite::Statement close{handle_,
+                          "UPDATE run_span SET last_seq = min(coalesce(last_seq, ?3 - 1), ?3 - 1)"
+                          " WHERE run_id = ?1 AND span = ?2"};
+  execute(close, id, span, next_seq);
   // The station has received these samples, though they need not be stored yet: if they never are, they count as lost.
   SQLite::Statement made{handle_,
                          "UPDATE boot SET announced_next_seq = max(announced_next_seq, ?2) WHERE boot_key = ?1"};
-  execute(made, boot_key, next);
+  execute(made, boot_key, next_seq);
 }
 
 }  // namespace server::storage

@@ -1,7 +1,7 @@
 // What changes runs in the database: begin, end, interrupt, make afterwards, annotate, discard.
 //
-// Disk thread only; each call is one transaction, with its entries in the audit. Uses the Database, which outlives it.
-// An open run has exactly one open span; BootStore::start moves it to a new boot.
+// Disk thread only; each call but end() is one transaction, with its entries in the audit. Uses the Database, which
+// outlives it. An open run has exactly one open span; BootStore::start moves it to a new boot.
 #pragma once
 
 #include <cstdint>
@@ -17,9 +17,18 @@
 
 namespace server::storage {
 
+// Where and how a run ends.
+struct RunEnd {
+  station::BootId boot_id = 0;
+  std::uint64_t next_seq = 0;  // of that boot, one above the run's last sample
+  std::string verdict;         // empty: the one it has
+  std::string station_document;
+  station::Author by;
+};
+
 class RunStore {
  public:
-  RunStore(Database& database, BootHeads heads) : handle_{database.handle()}, heads_{std::move(heads)} {}
+  explicit RunStore(Database& database) : handle_{database.handle()} {}
 
   // Stores a run with its one open span. not_connected when that boot has ended meanwhile. The station's document, if
   // there is one, is noted as in force in its spans, here and in end().
@@ -33,8 +42,9 @@ class RunStore {
   Result<void> annotate(RunId id, const RunAnnotation& annotation, const station::Author& by);
   Result<void> discard(RunId id, const std::string& reason, const station::Author& by);
 
-  // Closes the open span at the newest sample (a span without samples is dropped) and the run.
-  void end(RunId id, const std::string& verdict, const std::string& station_document, const station::Author& by);
+  // Closes the run and its span of that boot (a span without samples is dropped); what reboots have begun since then is
+  // no part of it. The caller's transaction.
+  void end(RunId id, const RunEnd& end);
 
   // Closes every open run at the last sample known of its open span. Returns which they were.
   std::vector<RunId> interrupt(std::int64_t utc_us);
@@ -46,10 +56,10 @@ class RunStore {
   void add_note(RunId id, const station::Author& author, const std::string& field, const std::string& before,
                 const std::string& after);
   void put_in_force(RunId id, const std::string& station_document, std::int64_t utc_us);
-  void close_span(RunId id);
+  void close_open_span(RunId id);
+  void close_span(RunId id, std::int64_t span, std::int64_t boot_key, std::uint64_t next_seq);
 
   SQLite::Database& handle_;
-  BootHeads heads_;
 };
 
 station::RobotId robot_of(SQLite::Database& database, RunId run);  // empty: there is no such run

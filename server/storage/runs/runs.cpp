@@ -20,14 +20,10 @@ using namespace std::chrono_literals;
 namespace {
 
 constexpr std::size_t kMaxNameBytes = 200;
-constexpr std::size_t kMaxTextBytes = 10'000;
 constexpr std::size_t kMaxListed = 1001;  // a page, and one more that shows whether there are others
-constexpr microseconds kEndPatience = 3s;
-constexpr microseconds kEndLook = 50ms;
-constexpr microseconds kLoadInterval = 1s;
 
 Error text_too_long() {
-  return {ErrorCode::invalid, fmt::format("a run's texts have at most {} bytes each", kMaxTextBytes), ""};
+  return {ErrorCode::invalid, fmt::format("a run's texts have at most {} bytes each", kMaxRunTextBytes), ""};
 }
 
 Result<void> check(const RunConditions& conditions) {
@@ -40,12 +36,10 @@ Result<void> check(const RunConditions& conditions) {
   for (const std::string* text :
        {&conditions.fluid, &conditions.pump_profile, &conditions.tube, &conditions.operator_name, &conditions.profile,
         &conditions.notes, &conditions.verdict}) {
-    if (text->size() > kMaxTextBytes) return std::unexpected{text_too_long()};
+    if (text->size() > kMaxRunTextBytes) return std::unexpected{text_too_long()};
   }
   return {};
 }
-
-bool is_complete(const Run& run) { return run.samples_stored + run.samples_lost >= run.samples_expected; }
 
 Error disk_fails() {
   return {ErrorCode::unavailable, "the disk cannot be written now; the station's log says why. Try again", ""};
@@ -89,29 +83,10 @@ void report_interrupted(const Result<std::vector<InterruptedRun>>& interrupted, 
   }
 }
 
-Error no_such_run(RunId id) { return {ErrorCode::not_found, fmt::format("there is no run {}", id), ""}; }
-
 }  // namespace
 
-const char* text(RunState value) {
-  switch (value) {
-    case RunState::open: return "open";
-    case RunState::ended: return "ended";
-    case RunState::interrupted: return "interrupted";
-    case RunState::discarded: return "discarded";
-  }
-  return "open";
-}
-
-std::optional<RunState> run_state_from(const std::string& name) {
-  for (const RunState state : {RunState::open, RunState::ended, RunState::interrupted, RunState::discarded}) {
-    if (name == text(state)) return state;
-  }
-  return std::nullopt;
-}
-
 Runs::Runs(runtime::Clock& clock, Recorder& recorder, DatabaseReader& reader, RunDigester& digester)
-    : clock_{clock}, recorder_{recorder}, reader_{reader}, digester_{digester} {}
+    : clock_{clock}, recorder_{recorder}, reader_{reader}, digester_{digester}, changed_{recorder.loop()} {}
 
 asio::awaitable<void> Runs::load() {
   auto by_stop = or_problem([](Database& database) {
@@ -123,18 +98,11 @@ asio::awaitable<void> Runs::load() {
 
 asio::awaitable<void> Runs::interrupt_open() {
   auto by_kill = or_problem([utc_us = clock_.utc_us()](Database& database) {
-    return read_interrupted(database.handle(), RunStore{database, {}}.interrupt(utc_us));
+    return read_interrupted(database.handle(), RunStore{database}.interrupt(utc_us));
   });
   const auto interrupted = co_await recorder_.on_disk(std::move(by_kill));
   is_loaded_ = interrupted.has_value();
   report_interrupted(interrupted, envelope_);
-}
-
-asio::awaitable<void> Runs::finish_loading() {
-  while (!is_loaded_) {
-    co_await clock_.sleep_for(kLoadInterval);
-    co_await interrupt_open();
-  }
 }
 
 // Makes of it the name as it is listed.
@@ -154,6 +122,7 @@ asio::awaitable<Result<Run>> Runs::create(station::RobotId robot_id, RunConditio
     co_return fail(ErrorCode::not_connected, fmt::format("robot '{}' is not connected", robot_id));
   }
   if (const auto open = open_runs_.find(robot_id); open != open_runs_.end()) {
+    if (ending_.contains(open->second)) co_return std::unexpected{end_is_not_stored(open->second)};
     co_return fail(ErrorCode::conflict,
                    fmt::format("robot '{}' has an open run ({}); end it first", robot_id, open->second));
   }
@@ -188,59 +157,19 @@ asio::awaitable<Result<Run>> Runs::create(station::RobotId robot_id, RunConditio
   // The run is stored after the connection it begins in, so a later boot can follow it.
   const bool flushed = co_await recorder_.flush_records();
   if (!flushed) co_return std::unexpected{disk_fails()};
-  auto job = [run, document = station_document_, by](Database& database) {
-    return RunStore{database, {}}.add(run, document, by);
+  auto job = [run, document = station_document_, by](Database& database) -> Result<RunId> {
+    try {
+      return RunStore{database}.add(run, document, by);
+    } catch (const SQLite::Exception& error) {
+      spdlog::warn("a run cannot be begun: {}", runtime::text_of(error));
+      return std::unexpected{disk_fails()};
+    }
   };
   const Result<RunId> id = co_await recorder_.on_disk(std::move(job));
   if (!id) co_return std::unexpected{id.error()};
   open_runs_[robot_id] = *id;
   run.id = *id;
   co_return announced(std::move(run));
-}
-
-asio::awaitable<Result<Run>> Runs::end(RunId id, std::string verdict, station::Author by) {
-  if (verdict.size() > kMaxTextBytes) {
-    co_return fail(ErrorCode::invalid, fmt::format("a verdict has at most {} bytes", kMaxTextBytes));
-  }
-  BootHeads received = heads();                             // of the boot that a reboot may end meanwhile
-  const bool flushed = co_await recorder_.flush_records();  // a reboot received before this moves the open span first
-  if (!flushed) co_return std::unexpected{disk_fails()};
-  for (const auto& [boot_id, next_seq] : heads()) received[boot_id] = std::max(received[boot_id], next_seq);
-  const auto open = std::ranges::find(open_runs_, id, [](const auto& entry) { return entry.second; });
-  if (id == 0 || open == open_runs_.end()) {
-    const std::optional<Run> known = co_await read(id);
-    if (!known) co_return std::unexpected{no_such_run(id)};
-    co_return fail(ErrorCode::conflict, fmt::format("run {} has ended already", id));
-  }
-  const auto robot = robots_.find(open->first);
-  const station::BootId boot_id = robot == robots_.end() ? 0 : robot->second.boot_id;
-  by.at_us = clock_.utc_us();
-  auto job = [id, verdict, by, heads = std::move(received), document = station_document_](Database& database) {
-    RunStore{database, heads}.end(id, verdict, document, by);
-  };
-  struct Ending {  // by one request at a time; the run stays open when the job throws
-    std::set<RunId>& ending;
-    RunId id;
-    ~Ending() { ending.erase(id); }
-  };
-  if (!ending_.insert(id).second) co_return fail(ErrorCode::conflict, fmt::format("run {} is being ended", id));
-  {
-    const Ending ending{ending_, id};
-    co_await recorder_.on_disk(std::move(job));
-  }
-  std::erase_if(open_runs_, [id](const auto& entry) { return entry.second == id; });
-
-  const std::int64_t deadline_us = clock_.steady_us() + kEndPatience.count();
-  for (;;) {
-    const bool stored = co_await recorder_.flush(boot_id);
-    std::optional<Run> run = co_await read(id);
-    if (!run) co_return std::unexpected{no_such_run(id)};
-    if (!stored || is_complete(*run) || clock_.steady_us() >= deadline_us) {
-      digester_.add(id);
-      co_return announced(std::move(*run));
-    }
-    co_await clock_.sleep_for(kEndLook);
-  }
 }
 
 asio::awaitable<Result<Run>> Runs::make_afterwards(station::RobotId robot_id, RunConditions conditions,
@@ -267,7 +196,7 @@ asio::awaitable<Result<Run>> Runs::make_afterwards(station::RobotId robot_id, Ru
     const Result<RecordedSamples> samples = co_await samples_in(run.robot_id, range);
     if (!samples) co_return std::unexpected{samples.error()};
     auto job = [run, found = *samples, by](Database& database) {
-      return RunStore{database, {}}.add_afterwards(run, found, by);
+      return RunStore{database}.add_afterwards(run, found, by);
     };
     id = co_await recorder_.on_disk(std::move(job));
   }
@@ -288,7 +217,7 @@ asio::awaitable<Result<Run>> Runs::annotate(RunId id, RunAnnotation annotation, 
   given.name = annotation.texts.contains("name") ? annotation.texts.at("name") : "unchanged";
   Result<void> outcome = check(given);
   for (const auto& [field, value] : annotation.texts) {
-    if (outcome && value.size() > kMaxTextBytes) outcome = std::unexpected{text_too_long()};
+    if (outcome && value.size() > kMaxRunTextBytes) outcome = std::unexpected{text_too_long()};
   }
   by.at_us = clock_.utc_us();
   if (const auto fluid = annotation.texts.find("fluid"); outcome && fluid != annotation.texts.end()) {
@@ -301,17 +230,17 @@ asio::awaitable<Result<Run>> Runs::annotate(RunId id, RunAnnotation annotation, 
   if (!outcome) co_return std::unexpected{outcome.error()};
   const bool flushed = co_await recorder_.flush_records();
   if (!flushed) co_return std::unexpected{disk_fails()};
-  auto job = [id, annotation, by](Database& database) { return RunStore{database, {}}.annotate(id, annotation, by); };
+  auto job = [id, annotation, by](Database& database) { return RunStore{database}.annotate(id, annotation, by); };
   outcome = co_await recorder_.on_disk(std::move(job));
   co_return co_await changed(id, std::move(outcome));
 }
 
 asio::awaitable<Result<Run>> Runs::discard(RunId id, std::string reason, station::Author by) {
-  if (reason.size() > kMaxTextBytes) co_return std::unexpected{text_too_long()};
+  if (reason.size() > kMaxRunTextBytes) co_return std::unexpected{text_too_long()};
   const bool flushed = co_await recorder_.flush_records();
   if (!flushed) co_return std::unexpected{disk_fails()};
   by.at_us = clock_.utc_us();
-  auto job = [id, reason, by](Database& database) { return RunStore{database, {}}.discard(id, reason, by); };
+  auto job = [id, reason, by](Database& database) { return RunStore{database}.discard(id, reason, by); };
   Result<void> outcome = co_await recorder_.on_disk(std::move(job));
   co_return co_await changed(id, std::move(outcome));
 }

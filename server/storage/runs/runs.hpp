@@ -10,7 +10,6 @@
 #include <functional>
 #include <map>
 #include <optional>
-#include <set>
 #include <string>
 #include <vector>
 
@@ -35,8 +34,9 @@ class Runs final : public station::StationSink {
   // Runs that were open when the station was killed are interrupted; the log names them, and those that its last stop
   // interrupted. Call before robots arrive.
   boost::asio::awaitable<void> load();
-  // What load() could not do, because the disk could not be written: until it is done. No run begins before.
-  boost::asio::awaitable<void> finish_loading();
+  // Until cancelled: does what load() could not do because the disk could not be written (no run begins before), and
+  // reports runs whose end was stored later than somebody waited for it.
+  boost::asio::awaitable<void> run();
 
   // Some run is open: it is to be interrupted when the recorder has written all that it received.
   bool any_open() const { return !open_runs_.empty(); }
@@ -75,8 +75,13 @@ class Runs final : public station::StationSink {
   using OnChange = std::function<void(const Run& run)>;
   void set_on_change(OnChange on_change) { on_change_ = std::move(on_change); }
 
-  // Ends the run with the latest sample received. Answers when that sample is durable or known lost, at most 3 s later.
-  boost::asio::awaitable<Result<Run>> end(RunId id, std::string verdict, station::Author by = {});
+  // Ends the run with the latest sample received until this call; that is fixed from now on, and stored in order with
+  // the samples: after a kill the run ends there or earlier. Answers when that sample is durable or known lost, at most
+  // 3 s after the end is stored. unavailable when it is not stored within 3 s, unless the caller waits `until_stored`:
+  // it is tried until it is. conflict when it has ended, or is being ended.
+  enum class Patience : std::uint8_t { of_a_person, until_stored };
+  boost::asio::awaitable<Result<Run>> end(RunId id, std::string verdict, station::Author by = {},
+                                          Patience patience = Patience::of_a_person);
 
   boost::asio::awaitable<Result<Run>> find(RunId id);
 
@@ -99,7 +104,29 @@ class Runs final : public station::StationSink {
     std::string fluid;
   };
 
+  struct Ending {
+    bool is_awaited = true;  // by who asked for it, and reports it
+  };
+  // Nobody waits for it any more, however that came.
+  struct Awaited {
+    Awaited(std::map<RunId, Ending>& of, RunId run) : ending{of}, id{run} {}
+    Awaited(const Awaited&) = delete;
+    Awaited& operator=(const Awaited&) = delete;
+    std::map<RunId, Ending>& ending;
+    RunId id;
+    ~Awaited() {
+      if (const auto found = ending.find(id); found != ending.end()) found->second.is_awaited = false;
+    }
+  };
+
+  static constexpr microseconds kLoadInterval{1'000'000};
+  static Error no_such_run(RunId id);
+  static Error end_is_not_stored(RunId id);
+
   boost::asio::awaitable<void> interrupt_open();
+  void on_end_stored(RunId id);
+  boost::asio::awaitable<bool> report_end(RunId id);
+  boost::asio::awaitable<std::uint64_t> next_seq_of(station::BootId boot_id);
   Result<void> check_fluid(std::string& fluid) const;
   boost::asio::awaitable<Result<RecordedSamples>> samples_in(station::RobotId robot_id, RecordedRange range);
   boost::asio::awaitable<Result<Run>> changed(RunId id, Result<void> outcome);
@@ -122,7 +149,9 @@ class Runs final : public station::StationSink {
     return Result<void>{};
   };
   OnChange on_change_ = [](const Run&) {};
-  std::set<RunId> ending_;  // of these, the ones whose end is being stored
+  std::map<RunId, Ending> ending_;  // of open_runs_, those whose end is not stored yet
+  std::vector<RunId> ended_late_;   // not reported yet
+  runtime::Signal changed_;
 };
 
 }  // namespace server::storage

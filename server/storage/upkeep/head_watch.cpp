@@ -5,6 +5,7 @@
 #include <spdlog/spdlog.h>
 #include <sqlite3.h>
 
+#include <functional>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <utility>
@@ -34,8 +35,9 @@ struct Look {
 };
 
 // Reads with a handle of its own, which sees what is durable.
-Look write_if_changed(const std::filesystem::path& path, HeadFile file) {
+Look write_if_changed(const std::filesystem::path& path, HeadFile file, const std::function<bool()>& names_hold) {
   try {
+    if (!names_hold()) return {std::nullopt, "the files of the database have lost their names"};
     SQLite::Database database = open_for_reading(path);
     const StoreHead now = read_store_head(database);
     if (now == file.head) return {};
@@ -111,7 +113,9 @@ asio::awaitable<void> HeadWatch::run() {
     co_await clock_.sleep_for(interval_);
     HeadFile file = file_;
     file.at_us = clock_.utc_us();
-    auto job = [path = path_, file] { return write_if_changed(path, file); };
+    auto job = [path = path_, file, names_hold = recorder_.names_hold()] {
+      return write_if_changed(path, file, names_hold);
+    };
     Look look = co_await checkpoints_.run(std::move(job));
     if (look.written) file_.head = *look.written;
     note_problem(std::move(look.problem));

@@ -46,7 +46,7 @@ void copy_database(const fs::path& from, const fs::path& to) {
 
 RestoredStore mark(Database& database, const fs::path& from, const station::Author& by) {
   RestoredStore restored;
-  restored.runs_interrupted = static_cast<std::int64_t>(RunStore{database, {}}.interrupt(by.at_us).size());
+  restored.runs_interrupted = static_cast<std::int64_t>(RunStore{database}.interrupt(by.at_us).size());
   SQLite::Database& handle = database.handle();
   SQLite::Transaction transaction{handle, SQLite::TransactionBehavior::IMMEDIATE};
   randombytes_buf(&restored.store_id, sizeof restored.store_id);

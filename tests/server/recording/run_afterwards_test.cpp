@@ -152,7 +152,7 @@ TEST_F(RunAfterwardsTest, ABootThatIsPurgedBeforeTheRunHoldsItIsNotOfTheRun) {
   Run run;
   run.robot_id = robot_.id;
   const auto store = [run, found](storage::Database& disk) {
-    return storage::RunStore{disk, {}}.add_afterwards(run, found, {});
+    return storage::RunStore{disk}.add_afterwards(run, found, {});
   };
   const auto purge = [](storage::Database& disk) {
     return disk.handle().exec("DELETE FROM segment WHERE boot_key = 1");

@@ -163,18 +163,6 @@ TEST_F(RunsTest, RefusesASecondRunAnUnknownRobotAndABadName) {
   disconnect(robot_);
 }
 
-TEST_F(RunsTest, ARunWhoseEndCannotBeStoredStaysOpenAndCanBeEndedLater) {
-  start();
-  connect(robot_);
-  const storage::RunId id = create();
-  SQLite::Database foreign{path_.string(), SQLite::OPEN_READWRITE, 5000};
-  foreign.exec("CREATE TRIGGER full BEFORE UPDATE ON run BEGIN SELECT RAISE(ABORT, 'the disk is full'); END");
-  EXPECT_THROW(wait(runs_->end(id, "")), std::exception);
-  EXPECT_EQ(wait(runs_->create(robot_.id, named("second"))).error().code, ErrorCode::conflict);
-  foreign.exec("DROP TRIGGER full");
-  EXPECT_TRUE(end(id).ended_at_us.has_value());
-}
-
 TEST_F(RunsTest, ListsNewestFirstInPages) {
   start();
   connect(robot_);

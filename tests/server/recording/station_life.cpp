@@ -50,7 +50,10 @@ void StationLife::live_until_cut() {
   if (!vfs_.has_failed()) return;  // a fault ended it
   const bool only_killed = pick(4) == 0;
   cuts_.push_back((only_killed ? "kill in " : "") + vfs_.failed_call());
-  if (!only_killed) vfs_.lose_power(random_);
+  if (!only_killed) {
+    vfs_.lose_power(random_);
+    std::filesystem::remove_all(storage::kept_folder_of(path_));  // names that were never synced
+  }
   for (RingRobot& robot : robots_) {  // time passes until the station is back
     if (pick(4) == 0) reboot(robot);
     make_samples(robot, pick(pick(4) == 0 ? 400 : 40));

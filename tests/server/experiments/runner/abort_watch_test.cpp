@@ -27,7 +27,7 @@ class AbortWatchTest : public ::testing::Test {
     return *watch_;
   }
   std::string reason() {
-    const auto found = watch().check(now_us_);
+    const auto found = watch().fault() ? watch().fault() : watch().late(now_us_);
     return found ? found->reason : "";
   }
 

@@ -155,5 +155,28 @@ TEST(CommandFeed, AStepIsRepeatedFromWhereTheRobotCanBeginIt) {
   EXPECT_EQ(first->command.execute_at_robot_us, kBegin_us);
 }
 
+TEST(CommandFeed, WhatIsLeftBeginsWithTheDutyInForce) {
+  const TimeLine line = line_of(duty_step("duty", "duty = 0.3\nfor_s = 10") + duty_step("rest", "for_s = 2"));
+  const TimeLine rest = rest_of(line, 0, 400);
+  ASSERT_EQ(rest.actions.size(), line.actions.size());
+  EXPECT_EQ(rest.actions.front(), (Action{0, ActionKind::duty, 0.3, 0}));
+  EXPECT_EQ(rest.ticks, line.ticks - 400);
+  EXPECT_EQ(rest.step_begins, (std::vector<std::uint64_t>{0, 600}));
+  EXPECT_FALSE(duty_in_force(line, 0, 0)) << "it is set there";
+  EXPECT_FALSE(duty_in_force(line, 1, 1100)) << "the motor is off";
+}
+
+TEST(CommandFeed, GoesOnAtATick) {
+  TimeLine line = line_of(duty_step("duty", "duty = 0.3\nfor_s = 10"));
+  line.actions.insert(line.actions.begin() + 1, *duty_in_force(line, 0, 400));
+  CommandFeed feed{line, 0, kBegin_us, 400};
+  const auto sent = all_of(feed, kBegin_us + 8'000'000);
+  const auto duties = duties_of(sent);
+  EXPECT_EQ(duties.begin()->first, 0U);
+  EXPECT_FLOAT_EQ(duties.begin()->second, 0.3F);
+  EXPECT_EQ(duties.rbegin()->first, 600U) << "what was left of it";
+  EXPECT_EQ(duties.rbegin()->second, 0);
+}
+
 }  // namespace
 }  // namespace server::experiments

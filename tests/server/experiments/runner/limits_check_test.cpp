@@ -1,5 +1,5 @@
 // Profiles against the station's limits; the longest time in auto; the prediction that is stored.
-#include "server/experiments/runner/limits_check.hpp"
+#include "server/experiments/limits_check.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

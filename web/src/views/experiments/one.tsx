@@ -122,8 +122,8 @@ function Head({ session, experiment }: { session: Session; experiment: Experimen
       </div>
       {stale && (
         <p class="problem" role="status">
-          Cut off from the station: what the robot does now is not known. Cut off for 3 s, the station ends what acts in
-          the name of this page.
+          Cut off from the station: what the robot does now is not known. Cut off for 3 s, what acts in the name of this
+          page comes to rest, and ends 10 s later.
         </p>
       )}
       {progress && !is_over && (

@@ -1,4 +1,4 @@
-#include "server/experiments/runner/limits_check.hpp"
+#include "server/experiments/limits_check.hpp"
 
 #include <fmt/format.h>
 
