@@ -280,7 +280,7 @@ CREATE TABLE meta (
   value INTEGER NOT NULL
 ) WITHOUT ROWID;
 INSERT INTO meta VALUES('commands_before_audit',0);
-INSERT INTO meta VALUES('commits',25);
+INSERT INTO meta VALUES('commits',27);
 INSERT INTO meta VALUES('next_boot_key',6);
 INSERT INTO meta VALUES('next_row',411);
 INSERT INTO meta VALUES('restored_at_us',1795578959000000);
