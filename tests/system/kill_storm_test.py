@@ -40,10 +40,10 @@ SMALL_DISK = "RHEONAUT_SMALL_DISK"  # this program runs in its own mount namespa
 class Robots:
     """A fleet in a process of its own, until it is told to end."""
 
-    def __init__(self, address, ledger, number=ROBOTS):
+    def __init__(self, address, ledger=None, number=ROBOTS):
         self.number = number
         self.process = subprocess.Popen([BIN / "rheonaut-sim", "replay", "--station", address, "--robots", str(number),
-                                         "--json", "--ledger", ledger], stdout=subprocess.PIPE, text=True)
+                                         "--json", *(["--ledger", ledger] if ledger else [])], stdout=subprocess.PIPE, text=True)
         self.last_line = ""
         self.all_in = threading.Event()
         self.listener = threading.Thread(target=self.listen)
