@@ -12,7 +12,7 @@ import unittest
 from processes import BIN, lab
 
 # Takes longer than a second: a search from many starts over a recording with noise.
-SLOW = ("identify", "--structure", "fractional", "--time-limit-s", "4")
+SLOW = ("identify", "--structure", "fractional")
 
 
 def on_a_terminal(words, is_enough=lambda text: False, **environment):
