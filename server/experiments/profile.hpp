@@ -80,7 +80,7 @@ struct AbortCriteria {
   double position_min_m = -100, position_max_m = 100;
   double position_sd_max_m = 10;
   double power_s = 60;         // at a duty beyond 0.9
-  double gap_s = 1;            // without a sample
+  double gap_s = 1;            // without a sample: it is interrupted
   double missing_share = 0.1;  // of the samples of the last 10 s
   bool sensor_fault = true;
 };

@@ -76,7 +76,7 @@ bool is_of_auto(const TimeLine& line, std::size_t step);
 // off.
 std::optional<Action> duty_in_force(const TimeLine& line, std::size_t step, std::uint64_t tick);
 
-// What is left of a line from a tick of a step on, with the duty in force there, as a line of its own with the same
+// The rest of a line from a tick of a step on, with the duty in force there, as a line of its own with the same
 // steps.
 TimeLine rest_of(const TimeLine& line, std::size_t step, std::uint64_t tick);
 

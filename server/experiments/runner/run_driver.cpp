@@ -209,7 +209,7 @@ void RunDriver::on_own_command(const station::CommandRecord& record) {
   abort(std::move(*fault));
 }
 
-// What a late command did not do is done again when the robot has been seen at rest.
+// A late command is given again when the robot has been seen at rest.
 Abort RunDriver::came_late(const std::string& kind) const {
   const microseconds stood = parts_.clock.watch().stood_still_within(kLatelyWithin, parts_.clock.steady_us());
   const std::string cause =

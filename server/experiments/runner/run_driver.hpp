@@ -41,7 +41,7 @@ inline constexpr microseconds kCountDown{3'000'000};        // before it goes on
 inline constexpr microseconds kLongestPause{600'000'000};   // by a person
 inline constexpr microseconds kTakeOverWithin{60'000'000};  // after control has gone to somebody else
 inline constexpr int kMostBegins = 5;                       // of a closed-loop step, in one run
-// Of a step that goes on, interruptions: one for each so many seconds of its length, and kMostBegins in any case.
+// Interruptions of a step that goes on: one for each of these seconds of its length, and kMostBegins in any case.
 inline constexpr double kInterruptedEvery_s = 5;
 
 // What the driver works with; outlives it.

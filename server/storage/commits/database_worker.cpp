@@ -50,7 +50,7 @@ asio::awaitable<std::string> DatabaseWorker::write(const WriteBatch& commit) {
   co_return co_await run(std::move(job));
 }
 
-// What a job has written has its name, as far as that can be mended; if not, the next commit says so.
+// The files have their names after a job that wrote, as far as that can be mended; if not, the next commit says so.
 void DatabaseWorker::look_after(std::uint64_t commits_before) {
   if (store_->log_use().commits != commits_before) kept_->problem(database_->handle());
 }

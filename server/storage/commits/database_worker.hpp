@@ -102,7 +102,7 @@ class DatabaseWorker {
   Checkpointer& checkpointer_;
   std::filesystem::path path_;
   RescuePlace rescue_;
-  std::shared_ptr<KeptFiles> kept_;     // shared with whoever may open the database by its name
+  std::shared_ptr<KeptFiles> kept_;     // shared with all who may open the database by its name
   std::unique_ptr<Database> database_;  // used by jobs; by close() when no job can be under way
   std::unique_ptr<SampleStore> store_;
   bool is_written_ = false;  // the commit, but its files have lost their names

@@ -36,8 +36,8 @@ struct StoredInForce {
   station::InForceRecord record;
 };
 
-// What another part has stored in order with the samples: after all that was received before it, before all that was
-// received after it.
+// A change of another part, in order with the samples: in one commit with the first of those that were received after
+// it, or before; so none of them is stored without it. Boots that began before it are stored by then.
 struct Change {
   std::function<void(Database&)>
       apply;                     // on the disk thread; again while the commit fails, so only the disk may fail it

@@ -26,8 +26,6 @@ void sync(const std::filesystem::path& path) {
   if (!synced) throw std::system_error{error, std::generic_category(), "cannot sync " + path.string()};
 }
 
-void sync_folder_of(const fs::path& path) { sync(fs::absolute(path).parent_path()); }
-
 // What is read of a synced file after this comes from its disk.
 void forget_cached(const fs::path& path) {
   const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
@@ -44,6 +42,8 @@ std::string read_piece(std::ifstream& file) {
 }
 
 }  // namespace
+
+void sync_folder_of(const fs::path& path) { sync(fs::absolute(path).parent_path()); }
 
 bool holds_the_same(const fs::path& file, const fs::path& copy) {
   forget_cached(copy);

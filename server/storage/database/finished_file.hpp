@@ -8,6 +8,9 @@ namespace server::storage {
 // Syncs the file `part`, renames it to `path`, and syncs the folder. Throws std::system_error.
 void finish_file(const std::filesystem::path& part, const std::filesystem::path& path);
 
+// The folder that this file is in: its name stays after a power cut. Throws std::system_error.
+void sync_folder_of(const std::filesystem::path& path);
+
 // Moves a whole file; both folders are synced. To another disk it is copied, and is there under its name when it has
 // been read back from there. Throws std::system_error, or std::runtime_error when what is read is not what was written.
 void move_finished(const std::filesystem::path& from, const std::filesystem::path& to);

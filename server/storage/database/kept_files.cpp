@@ -1,14 +1,13 @@
 // Hard links, three stats for each commit, and what becomes of the links.
 #include "server/storage/database/kept_files.hpp"
 
-#include <fcntl.h>
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 #include <sqlite3.h>
 #include <sys/stat.h>
-#include <unistd.h>
 
 #include <algorithm>
+#include <system_error>
 #include <utility>
 
 #include "server/runtime/exceptions.hpp"
@@ -38,19 +37,12 @@ fs::path free_name(const fs::path& path, const char* ending) {
   }
 }
 
-// What another program has put into this place.
+// The file that another program has put into this place.
 void move_aside(const fs::path& path) {
   if (!fs::exists(fs::symlink_status(path))) return;
   const fs::path to = free_name(path, ".foreign");
   fs::rename(path, to);
   spdlog::error("{} was not the station's any more: it is kept as {}", path.string(), to.string());
-}
-
-void sync_folder(const fs::path& folder) {
-  const int descriptor = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (descriptor < 0) return;
-  ::fsync(descriptor);
-  ::close(descriptor);
 }
 
 }  // namespace
@@ -134,8 +126,8 @@ void KeptFiles::put_back_log(SQLite::Database& handle) {
           "is lost. Leave the files of the data folder alone while a station runs",
           name.string());
     }
-    sync_folder(database_.parent_path());
-  } catch (const fs::filesystem_error& error) {
+    sync_folder_of(database_);
+  } catch (const std::system_error& error) {
     if (problem_.empty()) spdlog::error("a file does not get its name again: {}", runtime::text_of(error));
   }
   sqlite3_wal_checkpoint_v2(handle.getHandle(), nullptr, SQLITE_CHECKPOINT_PASSIVE, nullptr, nullptr);
@@ -181,7 +173,7 @@ void KeptFiles::copy(SQLite::Database& handle) {
   fs::create_directory(folder);
   fs::permissions(folder, fs::perms::owner_all);
   finish_file(draft.path(), folder / database_.filename());
-  sync_folder(to);
+  sync_folder_of(folder);
   secured_ = folder;
 }
 
@@ -222,8 +214,8 @@ void settle_kept_files(const fs::path& database) {
     }
     fs::remove(in_folder(folder, database, kIndex));
     fs::rename(folder, aside);
-    sync_folder(fs::absolute(database).parent_path());
-  } catch (const fs::filesystem_error& error) {
+    sync_folder_of(database);
+  } catch (const std::system_error& error) {
     spdlog::error("{}: {}", folder.string(), runtime::text_of(error));
   }
 }

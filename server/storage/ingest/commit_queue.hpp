@@ -61,7 +61,7 @@ class CommitQueue {
   // Takes the place of one that is queued of the same boot.
   void enqueue_start(BootEntry& boot, BootStart start);
 
-  // It goes with the first commit that has all samples and starts that were received before it.
+  // It goes with the first commit that has all starts of boots that were queued before it.
   void enqueue(Change change) { changes_.push_back({std::move(change), end_of_starts()}); }
 
   // Nothing is queued but segments.

@@ -152,8 +152,8 @@ class Recorder final : public station::StationSink, public station::RobotArchive
   boost::asio::awaitable<bool> flush_records();  // events, commands and boots
   boost::asio::awaitable<bool> flush_boots();    // boots and the spans that they moved; nothing is written if none wait
 
-  // Stored with the next commit, however often that fails: what was received before it is stored no later, and what is
-  // received after it no sooner.
+  // Stored with the next commit that has the boots which began before it, however often that fails. No sample that is
+  // received after it is stored without it; some of before it may be stored later.
   void store(Change change);
 
   // After the loop has ended: writes and commits everything left, or logs what could not be written; then `last` has

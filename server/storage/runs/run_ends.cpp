@@ -1,4 +1,4 @@
-// How runs end: what is fixed when it is asked for, who waits for it, and who hears of it when nobody does any more.
+// How runs end: what is fixed when it is asked for, who waits for it, and what is reported when nobody does any more.
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 

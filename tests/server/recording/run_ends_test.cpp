@@ -64,7 +64,7 @@ TEST_F(RunEndsTest, AnEndThatTheDiskDoesNotTakeIsStoredWhenItCanBe) {
   clock_.run_for(1s);
   expect_ended_at_120(id);
   EXPECT_EQ(find(id).ended_at_us, asked_at_us);
-  EXPECT_EQ(reported, std::vector{storage::RunState::ended}) << "whoever asked has gone";
+  EXPECT_EQ(reported, std::vector{storage::RunState::ended}) << "who asked has gone";
   EXPECT_TRUE(wait(recording_->digester.find(id))->is_final);
   EXPECT_EQ(end(id).error().code, ErrorCode::conflict) << "it has ended already";
   EXPECT_TRUE(create());
