@@ -171,7 +171,7 @@ void fields(base::Fields& fields, AbortCriteria& abort) {
   fields.number("position_max_m", abort.position_max_m, kPosition_m, "abort when the position plus 2 sd is above");
   fields.number("position_sd_max_m", abort.position_sd_max_m, {0.0001, 10}, "abort when the position is less certain");
   fields.number("power_s", abort.power_s, kTime_s, "longest time at a duty beyond 0.9");
-  fields.number("gap_s", abort.gap_s, {0.1, 60}, "longest time without a sample");
+  fields.number("gap_s", abort.gap_s, {0.1, 60}, "longest time without a sample; then the experiment is interrupted");
   fields.number("missing_share", abort.missing_share, {0, 1}, "of the samples of the last 10 s");
   fields.flag("sensor_fault", abort.sensor_fault, "abort when the robot reports one");
 }
