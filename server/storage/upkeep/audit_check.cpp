@@ -18,7 +18,7 @@ namespace server::storage {
 namespace {
 
 constexpr std::int64_t kPageRows = 1000;
-constexpr std::size_t kMostCommandFaults = 20;
+constexpr std::size_t kMostNamed = 20;  // of one kind; the others are counted
 constexpr int kFirstContentColumn = 1;  // of kAuditColumns
 constexpr int kContentHashColumn = 9;
 
@@ -110,8 +110,34 @@ class ChainWalk {
   std::optional<AuditEntry> latest_;
 };
 
-bool is_about_command(const station::AuditNote& note) {
-  return note.action.starts_with("command.") && note.action != "command.refused";
+// Faults of one kind: the first are named, and all are counted, so that none of another kind is hidden.
+class NamedFaults {
+ public:
+  NamedFaults(AuditFindings& findings, const char* kind) : findings_{findings}, kind_{kind} {}
+
+  void add(std::string fault) {
+    if (++count_ <= kMostNamed) findings_.faults.push_back(std::move(fault));
+  }
+  void finish() {
+    if (count_ > kMostNamed) findings_.faults.push_back(fmt::format("and {} more {}", count_ - kMostNamed, kind_));
+  }
+
+ private:
+  AuditFindings& findings_;
+  const char* kind_;
+  std::size_t count_ = 0;
+};
+
+// It says a state of a command, which the command's row names as its latest: not that a stop was asked for again, or
+// that something was refused.
+bool is_state_of_command(const station::AuditNote& note) {
+  constexpr std::string_view kCommand = "command.";
+  if (!note.action.starts_with(kCommand)) return false;
+  const std::string_view state = std::string_view{note.action}.substr(kCommand.size());
+  for (int value = 0; value <= static_cast<int>(station::kLastCommandState); ++value) {
+    if (state == station::text(static_cast<station::CommandState>(value))) return true;
+  }
+  return false;
 }
 
 // Finds an entry about a command which is not there; what the row says is compared from its side.
@@ -121,7 +147,7 @@ class CommandLookup {
       : row_{database, "SELECT coalesce(audit_entry, 0) FROM command WHERE command_id = ?"} {}
 
   std::optional<std::string> fault_of(const AuditEntry& entry) {
-    if (!is_about_command(entry.note)) return std::nullopt;
+    if (!is_state_of_command(entry.note)) return std::nullopt;
     const std::string& subject = entry.note.subject;
     std::uint64_t id = 0;
     std::from_chars(subject.data(), subject.data() + subject.size(), id);
@@ -141,6 +167,7 @@ class CommandLookup {
 
 // False: the chain is bad.
 bool walk_chain(SQLite::Database& database, ChainWalk& walk, AuditFindings& findings, CommandLookup* commands) {
+  NamedFaults faults{findings, "entries that their commands do not name"};
   std::int64_t after = std::numeric_limits<std::int64_t>::min();
   for (std::int64_t read = kPageRows; read == kPageRows;) {
     const SQLite::Transaction moment{database};
@@ -149,11 +176,15 @@ bool walk_chain(SQLite::Database& database, ChainWalk& walk, AuditFindings& find
     bind_all(rows, after, kPageRows);
     for (read = 0; rows.executeStep(); ++read) {
       after = rows.getColumn(0).getInt64();
-      if (!walk.take(rows)) return false;
-      if (commands == nullptr || findings.faults.size() >= kMostCommandFaults) continue;
-      if (auto fault = commands->fault_of(*walk.latest())) findings.faults.push_back(std::move(*fault));
+      if (!walk.take(rows)) {
+        faults.finish();
+        return false;
+      }
+      if (commands == nullptr) continue;
+      if (auto fault = commands->fault_of(*walk.latest())) faults.add(std::move(*fault));
     }
   }
+  faults.finish();
   walk.finish();
   return true;
 }
@@ -165,24 +196,23 @@ bool say_the_same(const station::AuditNote& a, const station::AuditNote& b) {
 }
 
 void check_command(const station::CommandRecord& command, std::int64_t entry, SQLite::Statement& by_entry,
-                   AuditFindings& findings) {
+                   AuditFindings& findings, NamedFaults& faults) {
   bind_all(by_entry, entry);
   const auto noted = by_entry.executeStep() ? audit_entry_from(by_entry) : std::nullopt;
   if (!noted) {
-    findings.faults.push_back(
-        fmt::format("command {} names entry {} of the audit, which is not there", command.id, entry));
+    faults.add(fmt::format("command {} names entry {} of the audit, which is not there", command.id, entry));
   } else if (!say_the_same(noted->note, audit_note_of(command))) {
-    findings.faults.push_back(
-        fmt::format("command {} does not say what entry {} of the audit says of it", command.id, entry));
+    faults.add(fmt::format("command {} does not say what entry {} of the audit says of it", command.id, entry));
   }
   ++findings.commands;
 }
 
 void check_commands(SQLite::Database& database, AuditFindings& findings) {
+  NamedFaults faults{findings, "commands that do not say what the audit says"};
   std::int64_t without_entry = 0;
   std::int64_t from = std::numeric_limits<std::int64_t>::min();
   std::int64_t last = from;
-  for (std::int64_t read = kPageRows; read == kPageRows && findings.faults.size() < kMostCommandFaults;) {
+  for (std::int64_t read = kPageRows; read == kPageRows;) {
     const SQLite::Transaction moment{database};
     SQLite::Statement by_entry{database, fmt::format("SELECT {} FROM audit WHERE entry = ?", kAuditColumns)};
     SQLite::Statement rows{database, select_commands("WHERE command_id >= ? ORDER BY command_id LIMIT ?")};
@@ -195,16 +225,17 @@ void check_commands(SQLite::Database& database, AuditFindings& findings) {
           command.state == station::CommandState::queued || command.state == station::CommandState::sent;
       if (entry.isNull()) {
         without_entry += is_unfinished ? 0 : 1;  // of before the audit: it gets one with its end
-      } else if (findings.faults.size() < kMostCommandFaults) {
-        check_command(command, entry.getInt64(), by_entry, findings);
+      } else {
+        check_command(command, entry.getInt64(), by_entry, findings, faults);
       }
     }
     if (last == std::numeric_limits<std::int64_t>::max()) break;
     from = last + 1;
   }
+  faults.finish();
   const auto before =
       database.execAndGet("SELECT coalesce(max(value), 0) FROM meta WHERE name = 'commands_before_audit'");
-  if (without_entry != before.getInt64() && findings.faults.size() < kMostCommandFaults) {
+  if (without_entry != before.getInt64()) {
     findings.faults.push_back(fmt::format("{} commands have no entry in the audit, but {} are older than it",
                                           without_entry, before.getInt64()));
   }

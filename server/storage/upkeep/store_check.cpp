@@ -6,6 +6,8 @@
 
 #include <limits>
 #include <map>
+#include <optional>
+#include <utility>
 
 #include "server/runtime/exceptions.hpp"
 #include "server/storage/database/statement.hpp"
@@ -18,7 +20,7 @@
 namespace server::storage {
 namespace {
 
-constexpr std::size_t kMostHoles = 100;  // reported of a boot
+constexpr std::size_t kMostHoles = 100;  // named of a boot; the others are counted
 constexpr std::int64_t kPageSegments = 1000;
 constexpr std::uint64_t kPageSamples = 100'000;
 constexpr std::uint64_t kEverySeq = std::numeric_limits<std::int64_t>::max();
@@ -86,8 +88,9 @@ class Checking {
   struct Covered {
     std::uint64_t next_seq = 0;
     const char* by = "";
-    std::uint64_t durable = 0;  // below it nothing may be missing
-    std::vector<Interval> holes;
+    std::uint64_t durable = 0;    // below it nothing may be missing
+    std::vector<Interval> holes;  // of this page
+    std::size_t found = 0;        // that are holes still when they are looked at again
   };
   template <class... Parts>
   void fault(fmt::format_string<Parts...> text, Parts&&... parts) {
@@ -96,7 +99,8 @@ class Checking {
   void check_segments(std::int64_t boot_key, Interval range, const std::string& whose);
   std::uint64_t durable_next_seq(std::int64_t boot_key);
   void cover(Covered& covered, std::int64_t boot_key, Interval range, const char* by);
-  void check_hole(std::int64_t boot_key, Interval hole);
+  void check_holes(Covered& covered, std::int64_t boot_key);
+  void check_hole(Covered& covered, std::int64_t boot_key, Interval hole);
   void check_rows(SQLite::Statement& segment, std::int64_t boot_key, const std::string& whose);
 
   SQLite::Database& database_;
@@ -161,7 +165,7 @@ void Checking::check_segments(std::int64_t boot_key, Interval range, const std::
   std::uint64_t from = range.first < 99 ? 0 : range.first - 99;
   std::int64_t read = kPageSegments;
   while (read == kPageSegments) {
-    const SQLite::Transaction moment{database_};
+    std::optional<SQLite::Transaction> moment{std::in_place, database_};
     SQLite::Statement segment{database_,
                               "SELECT first_seq, last_seq, first_row, last_row FROM segment"
                               " WHERE boot_key = ? AND first_seq >= ? AND first_seq < ? ORDER BY first_seq LIMIT ?"};
@@ -176,10 +180,21 @@ void Checking::check_segments(std::int64_t boot_key, Interval range, const std::
       cover(covered, boot_key, samples, "a segment");
       check_rows(segment, boot_key, whose);
     }
+    segment.reset();
+    moment.reset();
+    check_holes(covered, boot_key);
   }
   for (; due != gaps.end(); ++due) cover(covered, boot_key, {due->first, due->second}, "a gap");
   if (covered.next_seq < covered.durable) covered.holes.push_back({covered.next_seq, covered.durable});
-  for (const Interval& hole : covered.holes) check_hole(boot_key, hole);
+  check_holes(covered, boot_key);
+  if (covered.found > kMostHoles) {
+    fault("and {} more holes of boot key {}", covered.found - kMostHoles, boot_key);
+  }
+}
+
+void Checking::check_holes(Covered& covered, std::int64_t boot_key) {
+  for (const Interval& hole : covered.holes) check_hole(covered, boot_key, hole);
+  covered.holes.clear();
 }
 
 std::uint64_t Checking::durable_next_seq(std::int64_t boot_key) {
@@ -189,17 +204,20 @@ std::uint64_t Checking::durable_next_seq(std::int64_t boot_key) {
 }
 
 // Samples that every boot should have and that were in nothing when it was walked: they may have been purged meanwhile.
-void Checking::check_hole(std::int64_t boot_key, Interval hole) {
+void Checking::check_hole(Covered& covered, std::int64_t boot_key, Interval hole) {
   const SQLite::Transaction moment{database_};
   IntervalSet found;
-  for (const char* table : {"gap", "segment"}) {
+  const std::uint64_t from = hole.first < 99 ? 0 : hole.first - 99;  // where a segment that reaches into it may begin
+  for (const auto& [table, least] : {std::pair{"gap", std::uint64_t{0}}, std::pair{"segment", from}}) {
     SQLite::Statement query{database_, fmt::format("SELECT first_seq, last_seq FROM {} WHERE boot_key = ?"
-                                                   " AND first_seq < ? AND last_seq >= ? ORDER BY first_seq",
+                                                   " AND first_seq >= ? AND first_seq < ? AND last_seq >= ?"
+                                                   " ORDER BY first_seq",
                                                    table)};
-    bind_all(query, boot_key, hole.next, hole.first);
+    bind_all(query, boot_key, least, hole.next, hole.first);
     while (query.executeStep()) found.insert({unsigned_id(query.getColumn(0)), unsigned_id(query.getColumn(1)) + 1});
   }
   for (const Interval& missing : found.missing(hole)) {
+    if (++covered.found > kMostHoles) continue;
     fault("samples {} to {} of boot key {} are neither stored nor in a gap", missing.first, missing.next - 1, boot_key);
   }
 }
@@ -210,7 +228,7 @@ void Checking::cover(Covered& covered, std::int64_t boot_key, Interval range, co
           covered.by, covered.next_seq - 1);
   }
   const Interval hole{covered.next_seq, std::min(range.first, covered.durable)};
-  if (hole.first < hole.next && covered.holes.size() < kMostHoles) covered.holes.push_back(hole);
+  if (hole.first < hole.next) covered.holes.push_back(hole);
   if (range.next > covered.next_seq) {
     covered.next_seq = range.next;
     covered.by = by;

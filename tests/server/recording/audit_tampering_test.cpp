@@ -214,5 +214,53 @@ TEST_F(AuditTamperingTest, AnExpectedEntryThatIsThereIsGood) {
   EXPECT_THAT(findings(early).faults, ElementsAre(HasSubstr("entry 3 has the hash")));
 }
 
+// A stop that was asked for again, and what was refused, are of the audit and no state of a command.
+TEST_F(AuditTamperingTest, WhatIsNoStateOfACommandIsNoTampering) {
+  start();
+  for (int n = 0; n < 30; ++n) {
+    station::AuditNote again;
+    again.by = {"token:ana", "", clock_.utc_us()};
+    again.robot_id = "nemo";
+    again.action = n % 3 == 0 ? "command.refused" : "command.stop_again";
+    again.subject = n % 3 == 0 ? "nemo" : "1000003";
+    recorder_->on_audit(again);
+  }
+  ASSERT_TRUE(wait(recorder_->flush_records()));
+  stop();
+  EXPECT_THAT(findings().faults, IsEmpty());
+}
+
+// However many faults of one kind there are, each kind is named, and everything is compared.
+TEST_F(AuditTamperingTest, ManyFaultsOfOneKindHideNoneOfAnother) {
+  start();
+  for (int n = 1; n <= 60; ++n) {
+    station::CommandRecord command;
+    command.id = static_cast<station::CommandId>(n) * 7'000'003U;
+    command.robot_id = "nemo";
+    command.kind = "set_duty";
+    command.arguments = R"({"duty":0.1})";
+    command.actor = "token:ana";
+    command.submitted_at_us = clock_.utc_us();
+    for (const station::CommandState state : {station::CommandState::sent, station::CommandState::verified}) {
+      command.state = state;
+      recorder_->on_command(command);
+      ASSERT_TRUE(wait(recorder_->flush_records()));
+    }
+  }
+  stop();
+  {
+    SQLite::Database database{path_.string(), SQLite::OPEN_READWRITE, 5000};
+    database.exec(
+        "UPDATE command SET audit_entry = audit_entry - 1 WHERE command_id >= 7000003 AND command_id < 300000000");
+    database.exec("UPDATE command SET actor = 'token:eve' WHERE command_id = 1000003");
+  }
+  const std::vector<std::string> faults = findings().faults;
+  EXPECT_THAT(faults, testing::Contains(HasSubstr("command 1000003 does not say what entry")));
+  EXPECT_THAT(faults,
+              testing::Contains(testing::ContainsRegex("and [0-9]+ more entries that their commands do not name")));
+  EXPECT_THAT(faults, testing::Contains(testing::ContainsRegex("and [0-9]+ more commands that do not say")));
+  EXPECT_EQ(findings().commands, 70U);
+}
+
 }  // namespace
 }  // namespace server

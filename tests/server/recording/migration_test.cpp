@@ -5,6 +5,7 @@
 #include "server/storage/database/schema.hpp"
 #include "server/storage/query/run_reader.hpp"
 #include "server/storage/upkeep/audit_check.hpp"
+#include "server/storage/upkeep/store_check.hpp"
 #include "tests/server/recording/recording_test.hpp"
 
 namespace server {
@@ -15,12 +16,15 @@ class MigrationTest : public RecordingTest {
   static constexpr station::BootId kFirstBoot = 18364758544493064720U;  // of tests/data/recording/version_1.sql
   static constexpr station::BootId kSecondBoot = 4711;
 
-  void make_version_1() {
-    std::ifstream in{std::filesystem::path{TEST_DATA_DIR} / "recording/version_1.sql"};
+  void make_version(int version) {
+    std::ifstream in{std::filesystem::path{TEST_DATA_DIR} / fmt::format("recording/version_{}.sql", version)};
     std::ostringstream sql;
     sql << in.rdbuf();
     SQLite::Database database{path_.string(), SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE};
     database.exec(sql.str());
+  }
+  void make_version_1() {
+    make_version(1);
     ASSERT_EQ(number("SELECT count(*) FROM run_sample"), 250);
   }
 
@@ -142,6 +146,28 @@ TEST_F(MigrationTest, CommandsOfBeforeTheAuditAreCounted) {
   EXPECT_EQ(faults(), std::vector<std::string>{});
   add(7, "acknowledged");
   EXPECT_EQ(faults().size(), 1u);
+}
+
+// Of every version that has a file here, brought up to date and then run by a station.
+TEST_F(MigrationTest, EveryOldSchemaVerifiesAfterItsUpdate) {
+  for (const int version : {1, 6, 11}) {
+    std::filesystem::remove(path_);
+    make_version(version);
+    const auto faults = [this] {
+      SQLite::Database database = storage::open_for_reading(path_);
+      std::vector<std::string> found = storage::check_store(database, {.run = {}, .integrity = true})->faults;
+      for (std::string& fault : storage::check_audit(database, {}).faults) found.push_back(std::move(fault));
+      return found;
+    };
+    {
+      const storage::Database database{path_};
+    }
+    EXPECT_EQ(faults(), std::vector<std::string>{}) << "version " << version << ", updated";
+    start();
+    clock_.run_for(2s);
+    stop();
+    EXPECT_EQ(faults(), std::vector<std::string>{}) << "version " << version << ", after a station";
+  }
 }
 
 TEST_F(MigrationTest, ToolsReadVersion1WithoutChangingIt) {
