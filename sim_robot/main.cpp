@@ -1,12 +1,12 @@
 // The program rheonaut-sim: simulated robots, scenarios, predictions of experiments, a pump's profile, a bad network.
 #include <CLI/CLI.hpp>
-#include <csignal>
 #include <iostream>
 
 #include "base/command_line/help.hpp"
 #include "base/command_line/reference_flags.hpp"
 #include "base/command_line/suggestion.hpp"
 #include "base/failures/words.hpp"
+#include "base/resource_signals.hpp"
 #include "base/version.hpp"
 #include "sim_robot/cli/flow_command.hpp"
 #include "sim_robot/cli/play_command.hpp"
@@ -42,7 +42,7 @@ const base::command_line::ManualSection kExitStatuses{
 }  // namespace
 
 int main(int argc, char** argv) try {
-  std::signal(SIGPIPE, SIG_IGN);  // OpenSSL writes to sockets whose station is gone
+  base::ignore_resource_signals();
   CLI::App app{"Simulated swimming robot: the firmware core in a simulated world", "rheonaut-sim"};
   app.formatter(base::command_line::help_formatter());
   app.set_help_flag("-h,--help", "Print this help and exit");

@@ -5,11 +5,11 @@
 #include <sys/syscall.h>
 #include <unistd.h>
 
-#include <csignal>
 #include <cstdio>
 #include <exception>
 #include <string_view>
 
+#include "base/resource_signals.hpp"
 #include "base/version.hpp"
 #include "server/exporter/export_work.hpp"
 #include "server/runtime/exceptions.hpp"
@@ -21,11 +21,15 @@ static void tell(const storage::ExportLine& line) {
   if (::write(STDOUT_FILENO, text.data(), text.size()) < 0) ::_exit(EXIT_FAILURE);  // nobody waits for the file
 }
 
-// The recording goes first: its threads and its disk.
+// The recording goes first: its threads, its disk, and its memory: where that ends, this program is ended and no other.
 static void be_modest() {
   constexpr int kNiceness = 10, kOfThisProcess = 1, kIdleClass = 3, kClassShift = 13;
   ::setpriority(PRIO_PROCESS, 0, kNiceness);
   ::syscall(SYS_ioprio_set, kOfThisProcess, 0, kIdleClass << kClassShift);
+  if (std::FILE* score = std::fopen("/proc/self/oom_score_adj", "we")) {
+    std::fputs("1000", score);
+    std::fclose(score);
+  }
 }
 
 // It has one thread, and nobody asks how much memory SQLite has: so there are neither locks nor counts.
@@ -37,8 +41,7 @@ static void configure_sqlite() {
 int main(int argc, char** argv) try {
   if (argc == 2 && std::string_view{argv[1]} == "--version") return std::puts(base::version()) < 0 ? 1 : 0;
   configure_sqlite();
-  std::signal(SIGPIPE, SIG_IGN);
-  std::signal(SIGXFSZ, SIG_IGN);  // a file that may not grow is an error of write()
+  base::ignore_resource_signals();
   const auto received = storage::parse_export_arguments({argv + 1, argv + argc});
   if (!received) {
     tell(received.error());

@@ -159,6 +159,7 @@ class ExportTest(unittest.TestCase):
             wait_until(lambda: pathlib.Path(f"/proc/{pid}/comm").read_text() == "rheonaut-export\n"
                        and "State:\tS" in pathlib.Path(f"/proc/{pid}/status").read_text(), 60, "the wait")
             self.assertEqual(priority_of(pid), 10)
+            self.assertEqual(pathlib.Path(f"/proc/{pid}/oom_score_adj").read_text(), "1000\n")
             place.kill_station()
             wait_until(lambda: not is_alive(pid), 60, "the end of the program")
 

@@ -115,9 +115,10 @@ class PackageTest(unittest.TestCase):
         for unit in ("rheonaut.service", "rheonaut-backup.service", "rheonaut-backup.timer"):
             self.tree.run("systemd-analyze", "verify", "--man=no", f"/lib/systemd/system/{unit}")
         # Of 10; --threshold counts tenths.
-        exposure = self.tree.run("systemd-analyze", "security", "--offline=true", "--threshold=25",
-                                 "/lib/systemd/system/rheonaut.service").stdout
-        print(exposure.splitlines()[-1])
+        for unit in ("rheonaut.service", "rheonaut-backup.service"):
+            exposure = self.tree.run("systemd-analyze", "security", "--offline=true", "--threshold=25",
+                                     f"/lib/systemd/system/{unit}").stdout
+            print(exposure.splitlines()[-1])
         drop_in = self.path("/etc/systemd/system/rheonaut.service.d")
         drop_in.mkdir(parents=True)
         (drop_in / "sanitized.conf").write_text(SANITIZED)
