@@ -1,4 +1,4 @@
-// A text in TOML as a table, of bounded size.
+// A text in TOML as a table, of bounded size and depth.
 #pragma once
 
 #include <toml++/toml.h>
@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include "base/invalid_argument.hpp"
+#include "base/nesting.hpp"
 
 namespace base {
 
@@ -16,6 +17,9 @@ inline constexpr std::size_t kMaxDocumentBytes = 1'000'000;
 inline toml::table parse_toml(std::string_view text, const std::string& name) {
   if (text.size() > kMaxDocumentBytes) {
     throw_invalid(name, ": has ", text.size(), " bytes, allowed are ", kMaxDocumentBytes);
+  }
+  if (is_toml_deeper(text, kMostTomlDepth)) {
+    throw_invalid(name, ": has tables, keys and lists in each other, more than ", kMostTomlDepth, " deep");
   }
   try {
     return toml::parse(text, name);

@@ -1,14 +1,13 @@
 // Wires the ground station: what exists, what reports to what, how it stops.
 #include <spdlog/spdlog.h>
 
-#include <csignal>
-
+#include "base/resource_signals.hpp"
 #include "server/analysis/analysis_service.hpp"
 #include "server/api/api_server.hpp"
 #include "server/cli/command_line.hpp"
-#include "server/config/data_folder.hpp"
 #include "server/config/endpoint.hpp"
 #include "server/config/station_document.hpp"
+#include "server/config/station_folder.hpp"
 #include "server/config/supervision.hpp"
 #include "server/experiments/runner/experiments.hpp"
 #include "server/link/robot_listener.hpp"
@@ -23,7 +22,7 @@
 using namespace server;  // NOLINT: this file is the station, seen from outside
 static int serve(const config::Config& config) {
   runtime::start_log(config.log_level, config.log_format);
-  config::DataFolder folder{config.data_dir};
+  config::DataFolder folder = config::station_folder(config);
   boost::asio::io_context loop{1};  // all sockets, all live state; everything stands on it: it is destroyed last
   runtime::SystemClock clock{loop};
   runtime::WorkerThread disk{"disk"}, checkpoints{"checkpoints"};
@@ -47,7 +46,7 @@ static int serve(const config::Config& config) {
       loop, clock, tasks, station, recording.recorder, at, config.robots_or_any_port, security.robots()};
   station::ModelSender models{loop, tasks, clock, station, recording.fluid_models.in_force()};
   // People and scripts, and the experiments that act in their name.
-  experiments::Experiments experiments{{loop, clock, tasks, station}, recording, maths, config.allow_unattended};
+  experiments::Experiments experiments{{loop, clock, tasks, station}, recording, maths, config.experiments};
   analysis::AnalysisService analysis{recording.history, maths};
   const auto options = api::api_options(config, restored.store_id, config::text(robots.endpoint()), security);
   api::ApiServer api{loop, tasks, clock, options, station, live, recording, analysis, experiments};
@@ -70,7 +69,7 @@ static int serve(const config::Config& config) {
 }
 
 int main(int argc, char** argv) try {
-  std::signal(SIGPIPE, SIG_IGN);
+  base::ignore_resource_signals();
   const cli::CommandLine line = cli::parse_command_line(argc, argv);
   if (const auto exit_code = cli::answer(line)) return *exit_code;
   return serve(load_config(std::get<cli::Serve>(line).flags));

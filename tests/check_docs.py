@@ -77,7 +77,7 @@ def event_kinds(root):
     made = set()
     for source in (root / "server/station").rglob("*.cpp"):
         text = source.read_text(encoding="utf-8")
-        made |= set(re.findall(r"\bnote(?:_model)?\([^;\"]*?,\s*\"(\w+)\"", text))
+        made |= set(re.findall(r"\bnote(?:_model|_part)?\([^;\"]*?,\s*\"(\w+)\"", text))
         made |= set(re.findall(r"\brobot, \"(control_\w+)\"", text))
     yield from (f"docs/database.md: no row for the event {kind} of the station" for kind in sorted(made - listed))
     yield from (f"docs/database.md: the station makes no event {kind}" for kind in sorted(listed - made))

@@ -120,6 +120,9 @@ void check_recording(const Recording& recording) {
   if (!recording.is_missed.empty() && recording.is_missed.size() != samples) {
     refuse("is_missed has ", recording.is_missed.size(), " values, duty has ", samples, ": give one per sample");
   }
+  if (!recording.is_left_out.empty() && recording.is_left_out.size() != samples) {
+    refuse("is_left_out has ", recording.is_left_out.size(), " values, duty has ", samples, ": give one per sample");
+  }
   if (!recording.position_time_s.empty()) check_own_times(recording);
   if (!recording.position_sd_m.empty()) check_own_sds(recording);
   const std::size_t positions = recording.position_time_s.empty() ? samples : recording.position_time_s.size();

@@ -12,6 +12,7 @@
 #include "control/identification/fit_summary.hpp"
 #include "control/identification/residual_doubts.hpp"
 #include "control/search/fit_statistics.hpp"
+#include "control/search/missed_ticks.hpp"
 
 namespace control {
 namespace {
@@ -153,9 +154,10 @@ InitialMotion motion_with_lag(const Stacked& all, const Eigen::ColPivHouseholder
 // What a flexible model has bent itself to, (1) no longer shows; but its first samples then fit worse than the rest.
 void add_rough_beginning(const Recording& recording, const Fit& fit, std::vector<std::string>& warnings) {
   const auto& residual = recording.position_m.empty() ? fit.velocity_residual_m_s : fit.position_residual_m;
-  std::vector<double> size, end_s;  // of what was measured
+  const std::vector<bool> uncounted = uncounted_ticks(recording);
+  std::vector<double> size, end_s;  // of what counts
   for (std::size_t k = 0; k < residual.size(); ++k) {
-    if (!recording.is_missed.empty() && recording.is_missed[k]) continue;
+    if (!uncounted.empty() && uncounted[k]) continue;
     size.push_back(std::abs(residual[k]));
     end_s.push_back(recording.dt_s * static_cast<double>(k + 1));
   }

@@ -31,6 +31,9 @@ struct Recording {
   // Ticks at which nothing was measured: duty and values are filled in (missed_ticks.hpp), and the fit leaves the
   // values out. Empty: none.
   std::vector<bool> is_missed = {};
+  // Ticks that were measured and whose values the fit leaves out: the model is simulated through them with their duty.
+  // Of a position with times of its own it is the caller who leaves values out. Empty: none.
+  std::vector<bool> is_left_out = {};
 };
 
 enum class Cost { least_squares, absolute_error };
@@ -76,7 +79,7 @@ struct SensorFit {
   bool delay_is_at_limit = false;       // of what was searched
   double bias_m_s2 = 0;                 // in the mean; of recovered readings but for a constant
   double bias_range_m_s2 = 0;           // how far it wandered
-  std::size_t readings_left_out = 0;    // read twice, failed, or of uncertain age
+  std::size_t readings_left_out = 0;    // read twice, failed, of uncertain age, or of ticks that do not count
 };
 
 // Absent parameters (b1 of first order, the orders of integer structures) have no sigma and correlation 0.

@@ -63,6 +63,15 @@ std::size_t missed_ticks(const Recording& recording) {
   return static_cast<std::size_t>(std::ranges::count(recording.is_missed, true));
 }
 
+std::vector<bool> uncounted_ticks(const Recording& recording) {
+  std::vector<bool> uncounted = recording.is_missed;
+  uncounted.resize(std::max(uncounted.size(), recording.is_left_out.size()));
+  for (std::size_t k = 0; k < recording.is_left_out.size(); ++k) {
+    if (recording.is_left_out[k]) uncounted[k] = true;
+  }
+  return uncounted;
+}
+
 std::string missed_ticks_in_words(const Recording& recording) {
   const std::size_t missed = missed_ticks(recording), ticks = recording.is_missed.size();
   if (missed == 0) return {};

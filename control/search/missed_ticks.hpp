@@ -9,6 +9,7 @@
 #include <cstddef>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "control/search/fit.hpp"
 
@@ -25,6 +26,9 @@ bool may_be_missed(std::size_t missed, std::size_t ticks);
 void place_at_ticks(Recording& recording, std::span<const std::size_t> ticks);
 
 std::size_t missed_ticks(const Recording& recording);
+
+// Ticks whose values do not count in a fit: missed, or left out. Empty: all count.
+std::vector<bool> uncounted_ticks(const Recording& recording);
 
 // A warning for the reader of the fit; empty: none was missed.
 std::string missed_ticks_in_words(const Recording& recording);

@@ -7,6 +7,8 @@
 #include <optional>
 #include <utility>
 
+#include "control/search/missed_ticks.hpp"
+
 namespace control {
 namespace {
 
@@ -29,9 +31,9 @@ constexpr double kEarliestSample = 4, kLatestSample = 2;   // A of sensor_path.h
 constexpr double kLongestTimeConstant = 1;                 // of the sensor, in ticks: more is the fluid
 constexpr double kClockScaleS = 0.01, kLargestClock = 50;  // of a position's clock: half a second at most
 
-Eigen::VectorXd ones_but_at(const std::vector<bool>& missed) {
-  Eigen::VectorXd ones = Eigen::VectorXd::Ones(std::ssize(missed));
-  for (std::size_t k = 0; k < missed.size(); ++k) ones[static_cast<Index>(k)] = missed[k] ? 0 : 1;
+Eigen::VectorXd ones_but_at(const std::vector<bool>& uncounted) {
+  Eigen::VectorXd ones = Eigen::VectorXd::Ones(std::ssize(uncounted));
+  for (std::size_t k = 0; k < uncounted.size(); ++k) ones[static_cast<Index>(k)] = uncounted[k] ? 0 : 1;
   return ones;
 }
 
@@ -62,7 +64,8 @@ OutputErrorSearch::OutputErrorSearch(const Recording& recording, const Identific
   add(Channel::position, recording.position_m);
   add(Channel::velocity, recording.velocity_m_s);
   if (!recording.acceleration_m_s2.empty()) {
-    auto path = std::make_unique<SensorPath>(sensor_readings(recording.acceleration_m_s2), dt_s_, recording.is_missed);
+    auto path = std::make_unique<SensorPath>(sensor_readings(recording.acceleration_m_s2), dt_s_, recording.is_missed,
+                                             recording.is_left_out);
     const Eigen::VectorXd readings = path->readings();
     measured_.push_back({Channel::acceleration, OutputModel::with_means(dt_s_, recording.duty, kModelTolerance),
                          readings, scale_of(readings), Eigen::VectorXd::Ones(samples_), std::move(path)});
@@ -70,7 +73,7 @@ OutputErrorSearch::OutputErrorSearch(const Recording& recording, const Identific
     return;
   }
   if (!recording.position_time_s.empty()) return;
-  if (!recording.is_missed.empty()) counts_ = ones_but_at(recording.is_missed);
+  if (const auto uncounted = uncounted_ticks(recording); !uncounted.empty()) counts_ = ones_but_at(uncounted);
   if (options.longest_dead_time_s > 0) make_scan(recording);
 }
 

@@ -133,7 +133,7 @@ class OutputErrorSearch {
   double dt_s_;
   Eigen::Index samples_;
   Eigen::VectorXd
-      counts_;         // 1, or 0 at a tick that was missed; empty: every value of a channel without a sensor counts
+      counts_;         // 1, or 0 at a tick that does not count; empty: every value of a channel without a sensor counts
   Eigen::Index rows_;  // measured values of each channel: samples_, or of a position with times of its own their number
   double offset_scale_m_ = 1;
   bool sensor_is_found_ = false;

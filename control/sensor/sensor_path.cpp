@@ -32,11 +32,12 @@ Eigen::MatrixXd knots(Index samples, double duration_s, double knot_s) {
 
 }  // namespace
 
-SensorPath::SensorPath(SensorReadings readings, double dt_s, std::vector<bool> is_missed)
+SensorPath::SensorPath(SensorReadings readings, double dt_s, std::vector<bool> is_missed, std::vector<bool> is_left_out)
     : dt_s_(dt_s),
       reading_m_s2_(Eigen::Map<const Eigen::VectorXd>(readings.reading_m_s2.data(), std::ssize(readings.reading_m_s2))),
       is_repeated_(std::move(readings.is_repeated)),
       is_missed_(std::move(is_missed)),
+      is_left_out_(std::move(is_left_out)),
       are_recovered_(readings.are_recovered),
       knots_(knots(samples(), dt_s * static_cast<double>(samples() - 1), are_recovered_ ? kKnotS : kKnotOfFilterS)) {
   bridge_missed();
@@ -92,8 +93,10 @@ void SensorPath::leave_out_failed_reads(const Eigen::VectorXd& expected_m_s2, do
 }
 
 void SensorPath::set_weights() {
-  for (std::size_t k = 0; k < is_missed_.size(); ++k) {
-    if (is_missed_[k]) weight_[static_cast<Index>(k)] = 0;
+  for (const std::vector<bool>* uncounted : {&is_missed_, &is_left_out_}) {
+    for (std::size_t k = 0; k < uncounted->size(); ++k) {
+      if ((*uncounted)[k]) weight_[static_cast<Index>(k)] = 0;
+    }
   }
   weighed_knots_.compute(weight_.asDiagonal() * knots_);
 }

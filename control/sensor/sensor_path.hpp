@@ -40,8 +40,9 @@ struct ReadOrder {
 
 class SensorPath {
  public:
-  // is_missed: ticks without a reading; empty: none.
-  SensorPath(SensorReadings readings, double dt_s, std::vector<bool> is_missed = {});
+  // is_missed: ticks without a reading; is_left_out: ticks whose reading does not count; empty: none.
+  SensorPath(SensorReadings readings, double dt_s, std::vector<bool> is_missed = {},
+             std::vector<bool> is_left_out = {});
 
   Eigen::Index samples() const { return reading_m_s2_.size(); }
   double dt_s() const { return dt_s_; }
@@ -78,7 +79,7 @@ class SensorPath {
   double dt_s_;
   Eigen::Index delay_ticks_ = 0;
   Eigen::VectorXd reading_m_s2_;
-  std::vector<bool> is_repeated_, is_missed_;
+  std::vector<bool> is_repeated_, is_missed_, is_left_out_;
   bool are_recovered_;
   bool has_own_clock_ = false;
   ReadOrder order_;

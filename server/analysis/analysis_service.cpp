@@ -3,6 +3,8 @@
 
 #include <fmt/format.h>
 
+#include "server/storage/runs/run_queries.hpp"
+
 namespace server::analysis {
 namespace asio = boost::asio;
 
@@ -96,7 +98,19 @@ asio::awaitable<Result<RunSamples>> AnalysisService::samples(storage::RunId run,
   if (!gathered) co_return std::unexpected{gathered.error()};
   auto found = co_await reference_of(run);
   if (!found) co_return std::unexpected{found.error()};
-  co_return RunSamples{std::move(*gathered), std::move(*found)};
+  auto interrupted = co_await interrupted_parts(run);
+  if (!interrupted) co_return std::unexpected{interrupted.error()};
+  co_return RunSamples{std::move(*gathered), std::move(*found), std::move(*interrupted)};
+}
+
+asio::awaitable<Result<std::vector<storage::InterruptedPart>>> AnalysisService::interrupted_parts(storage::RunId run) {
+  const bool is_stored = co_await history_.settle();
+  if (!is_stored) {
+    co_return fail(ErrorCode::unavailable,
+                   fmt::format("what happened in run {} is not stored yet: the disk does not take it; ask again", run));
+  }
+  auto find = [run](SQLite::Database& database) { return storage::read_interrupted_parts(database, run); };
+  co_return co_await history_.reader().ask(std::move(find));
 }
 
 asio::awaitable<Result<PlacedReference>> AnalysisService::place(storage::RunId run, ReferenceRequest request,

@@ -23,12 +23,6 @@ struct RunTrace {
   std::optional<storage::StoredReference> reference;
 };
 
-// All that is recorded of a run.
-struct RunSamples {
-  std::vector<storage::StoredSample> samples;
-  std::optional<storage::StoredReference> reference;
-};
-
 class AnalysisService {
  public:
   AnalysisService(storage::History& history, runtime::WorkerThread& maths) : history_{history}, maths_{maths} {}
@@ -45,7 +39,8 @@ class AnalysisService {
   // What is said of the position that was measured from outside, if the run has one.
   boost::asio::awaitable<Result<std::optional<storage::OutsideReference>>> reference(storage::RunId run);
 
-  // In order of span and seq; invalid when there are more than `limit`.
+  // In order of span and seq; invalid when there are more than `limit`; unavailable while the disk does not take what
+  // happened in the run.
   boost::asio::awaitable<Result<RunSamples>> samples(storage::RunId run, std::size_t limit);
 
   // Puts an outside record onto the clock of the run; errors of place_reference, and as above.
@@ -59,6 +54,7 @@ class AnalysisService {
   }
 
  private:
+  boost::asio::awaitable<Result<std::vector<storage::InterruptedPart>>> interrupted_parts(storage::RunId run);
   // conflict: it was replaced or removed meanwhile.
   boost::asio::awaitable<Result<std::optional<storage::StoredReference>>> reference_of(storage::RunId run);
   // Of every sample of the run, what `of` makes of it.

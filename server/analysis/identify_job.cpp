@@ -20,8 +20,7 @@ struct ReadRun {
 };
 
 Result<RunOfMany> recording_in(const ReadRun& read, ChannelChoice channels) {
-  const auto& reference = read.samples.reference;
-  auto recording = recording_of(read.samples.samples, read.part.window, reference ? &*reference : nullptr, channels);
+  auto recording = recording_of(read.samples, read.part.window, channels);
   if (recording) return RunOfMany{read.part.run, std::move(*recording)};
   Error error = recording.error();
   error.detail = fmt::format("run {}: {}", read.part.run, error.detail);

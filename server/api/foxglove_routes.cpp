@@ -53,7 +53,7 @@ http::Answer without_upgrade(FoxgloveRoutes parts, http::Request) {
   co_return response;
 }
 
-// The ticket is looked at last, so that a wrong request does not use it up.
+// The ticket is used up last, so that a wrong request does not do it; who has none learns no robot's name.
 std::expected<identity::Caller, http::Response> let_in(const FoxgloveRoutes& parts, const http::Request& request) {
   if (!parts.is_enabled) return std::unexpected{is_off()};
   if (foxglove_protocol(request.header("sec-websocket-protocol")).empty()) {
@@ -64,7 +64,8 @@ std::expected<identity::Caller, http::Response> let_in(const FoxgloveRoutes& par
   std::map<std::string, std::string> query;
   for (auto& [name, value] : request.target.query().value_or(http::Target::Query{})) query.emplace(name, value);
   const auto robot = query.find("robot");
-  if (robot != query.end() && parts.clients.live.station.find(robot->second) == nullptr) {
+  const bool has_ticket = parts.tickets.holds(query["ticket"]);
+  if (has_ticket && robot != query.end() && parts.clients.live.station.find(robot->second) == nullptr) {
     return std::unexpected{unknown_robot(robot->second)};
   }
   auto caller = parts.tickets.redeem(query["ticket"]);

@@ -37,6 +37,8 @@ void add_options(CLI::App& command, config::ConfigFlags& flags) {
   add("--data", flags.data_dir, "Folder of everything the station keeps (default: rheonaut-data)");
   add("--http", flags.http, "ADDR:PORT of the page and the API (default: 127.0.0.1:8080; port 0: any)");
   add("--robots", flags.robots, "ADDR:PORT where robots dial in (default: 127.0.0.1:7070; port 0: any)");
+  command.add_flag("--any-file-system", flags.any_file_system,
+                   "Make a new store also on NFS, SMB or FAT, where it can be damaged");
 }
 
 void add_options(CLI::App& command, Serve& line) {

@@ -7,6 +7,7 @@
 #include <toml++/toml.h>
 #include <algorithm>
 #include <array>
+#include <cstdlib>
 #include <fstream>
 #include <iterator>
 #include <map>
@@ -15,16 +16,42 @@
 
 #include "base/fields.hpp"
 #include "base/invalid_argument.hpp"
+#include "base/nesting.hpp"
 #include "base/toml_value.hpp"
 #include "server/config/endpoint.hpp"
 
 namespace server::config {
 namespace {
 
+// "~/lab": of the user who runs this, as a shell has it.
+std::filesystem::path with_home(const std::string& path) {
+  const bool is_home = path == "~" || path.starts_with("~/");
+  const char* home = std::getenv("HOME");
+  if (!is_home || home == nullptr || *home == '\0') return path;
+  return path == "~" ? std::filesystem::path{home} : std::filesystem::path{home} / path.substr(2);
+}
+
+// A station of an older version took "~/lab" for a folder named "~" here, and has its recordings in it.
+std::filesystem::path data_folder_of(const std::string& path) {
+  const std::filesystem::path folder = with_home(path), older = path;
+  std::error_code ignored;
+  const bool is_left = folder != older && std::filesystem::exists(older / "station.sqlite", ignored) &&
+                       !std::filesystem::exists(folder / "station.sqlite", ignored);
+  if (is_left) {
+    base::throw_invalid("data.dir = '", path, "' is ", folder.string(), " now, and the recordings are in ",
+                        std::filesystem::absolute(older).string(), ": move that folder there, or name it as it is");
+  }
+  return folder;
+}
+
 // Takes values out of a parsed file; what is left at the end is a key that nobody knows.
 class ConfigFile {
  public:
   ConfigFile(const std::string& text, std::string name) : path_{std::move(name)} {
+    if (base::is_toml_deeper(text, base::kMostTomlDepth)) {
+      base::throw_invalid(path_, ": has tables, keys and lists in each other, more than ", base::kMostTomlDepth,
+                          " deep");
+    }
     try {
       table_ = toml::parse(text, path_);
     } catch (const toml::parse_error& error) {
@@ -141,8 +168,8 @@ void read_tls(ConfigFile& file, TlsConfig& tls) {
     file.fail(*file.find("tls", "mode"), "tls", "mode", fmt::format("= '{}' must be one of auto, on, off", mode));
   }
   tls.mode = *found;
-  if (file.take("tls", "certificate", certificate)) tls.certificate = certificate;
-  if (file.take("tls", "key", key)) tls.key = key;
+  if (file.take("tls", "certificate", certificate)) tls.certificate = with_home(certificate);
+  if (file.take("tls", "key", key)) tls.key = with_home(key);
   file.take("tls", "insecure", tls.insecure);
 }
 
@@ -191,7 +218,8 @@ void read_places(ConfigFile& file, const char* section, PortPlaces& places) {
 
 void read(ConfigFile& file, Config& config) {
   std::string data_dir;
-  if (file.take("data", "dir", data_dir)) config.data_dir = data_dir;
+  if (file.take("data", "dir", data_dir)) config.data_dir = data_folder_of(data_dir);
+  file.take("data", "any_file_system", config.any_file_system);
   if (file.take("http", "listen", config.http)) config.http_or_any_port = false;
   file.take_texts("http", "hosts", config.http_hosts);
   read_places(file, "http", config.http_places);
@@ -212,9 +240,10 @@ void read(ConfigFile& file, Config& config) {
   file.take_count("recording", "low_space_mb", {0, 100'000'000}, recording.low_space_mb);
   file.take_count("recording", "critical_space_mb", {0, 100'000'000}, recording.critical_space_mb);
   std::string backup_dir;
-  if (file.take("recording", "backup_dir", backup_dir)) recording.backup_dir = backup_dir;
+  if (file.take("recording", "backup_dir", backup_dir)) recording.backup_dir = with_home(backup_dir);
   read_tls(file, config.tls);
-  file.take("experiments", "allow_unattended", config.allow_unattended);
+  file.take("experiments", "allow_unattended", config.experiments.allow_unattended);
+  file.take_count("experiments", "back_within_s", {1, 60}, config.experiments.back_within_s);
   file.take("foxglove", "enabled", config.foxglove);
   file.take("station", "real_time", config.real_time);
   if (file.take("log", "level", config.log_level)) {
@@ -309,6 +338,7 @@ Config load_config(const ConfigFlags& flags) {
     read(file, config);
   }
   if (flags.data_dir) config.data_dir = *flags.data_dir;
+  if (flags.any_file_system) config.any_file_system = true;
   if (flags.http) {
     config.http = *flags.http;
     config.http_or_any_port = false;

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "server/config/envelope.hpp"
+#include "server/config/experiment_rules.hpp"
 #include "server/config/link_settings.hpp"
 
 namespace server::config {
@@ -69,8 +70,9 @@ struct Config {
 
   TlsConfig tls;
 
-  // SAFETY: experiments.allow_unattended: experiments may go on while nobody is there, in auto alone
-  bool allow_unattended = false;
+  bool any_file_system = false;  // data.any_file_system: a new store also where it can be damaged
+
+  ExperimentRules experiments;  // experiments.allow_unattended, .back_within_s
 
   bool foxglove = false;  // foxglove.enabled: live samples by the Foxglove WebSocket protocol
 
@@ -96,6 +98,7 @@ struct ConfigFlags {
   std::optional<std::filesystem::path> data_dir;
   std::optional<std::string> http;
   std::optional<std::string> robots;
+  bool any_file_system = false;
 };
 
 // Reads the file (if one is given), then applies the flags, then checks every value. Throws std::invalid_argument that

@@ -17,12 +17,17 @@ std::string Tickets::issue(Caller maker) {
 }
 
 std::optional<Caller> Tickets::redeem(const std::string& secret) {
+  const bool is_good = holds(secret);
   const Ticket* found = runtime::find_secret(tickets_, runtime::hash_of(secret));
   if (found == nullptr) return std::nullopt;
-  const Ticket ticket = *found;
+  std::optional<Caller> maker = is_good ? std::optional{found->maker} : std::nullopt;
   tickets_.remove_if([found](const Ticket& each) { return &each == found; });
-  const bool holds = ticket.ends_at_us > clock_.steady_us() && still_stands(ticket.maker);
-  return holds ? std::optional{ticket.maker} : std::nullopt;
+  return maker;
+}
+
+bool Tickets::holds(const std::string& secret) const {
+  const Ticket* found = runtime::find_secret(tickets_, runtime::hash_of(secret));
+  return found != nullptr && found->ends_at_us > clock_.steady_us() && still_stands(found->maker);
 }
 
 void Tickets::make_room(const std::string& actor) {

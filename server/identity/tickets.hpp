@@ -29,6 +29,8 @@ class Tickets {
   // Its maker, who may read alone; none: the ticket is unknown, used, too old, or its maker's credential has ended.
   std::optional<Caller> redeem(const std::string& secret);
 
+  bool holds(const std::string& secret) const;  // redeem() would give its maker
+
   std::size_t size() const { return tickets_.size(); }
 
  private:

@@ -66,7 +66,7 @@ class JsonLines final : public spdlog::formatter {
 std::unique_ptr<spdlog::formatter> log_formatter(const std::string& format) {
   if (format == "json") return std::make_unique<JsonLines>();
   auto text = std::make_unique<spdlog::pattern_formatter>();
-  text->add_flag<OneLine>('*').set_pattern("%Y-%m-%d %H:%M:%S.%e  %^%-7l%$  %*");
+  text->add_flag<OneLine>('*').set_pattern("%Y-%m-%d %H:%M:%S.%e %z  %^%-7l%$  %*");
   return text;
 }
 

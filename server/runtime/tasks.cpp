@@ -5,7 +5,6 @@
 
 #include <boost/asio/bind_cancellation_slot.hpp>
 #include <boost/asio/co_spawn.hpp>
-#include <boost/asio/signal_set.hpp>
 #include <boost/asio/use_awaitable.hpp>
 #include <chrono>
 #include <csignal>
@@ -17,6 +16,16 @@ namespace {
 
 constexpr std::chrono::milliseconds kPulse{50};  // a loop that has nothing to do shows so often that it runs
 
+// Until the program has ended, also after the loop and what stands on it have gone: a signal that nobody waits for is
+// kept by the registration, and ends nothing.
+void hold_signals() {
+  static auto* nobody = new asio::io_context;  // for ever
+  static auto* held = new asio::signal_set{*nobody, SIGINT, SIGTERM};
+  static_cast<void>(held);
+}
+
+const char* name_of(int signal) { return signal == SIGINT ? "SIGINT" : "SIGTERM"; }
+
 }  // namespace
 
 void TaskGroup::spawn(std::string name, asio::awaitable<void> task) {
@@ -25,6 +34,7 @@ void TaskGroup::spawn(std::string name, asio::awaitable<void> task) {
   auto on_end = [this, signal, name = std::move(name)](std::exception_ptr failure) {
     signals_.erase(signal);
     ended(name, failure);
+    if (signals_.empty()) stop_signals_.cancel();  // nothing keeps the loop any more
   };
   asio::co_spawn(loop_, std::move(task), asio::bind_cancellation_slot(signal->slot(), std::move(on_end)));
 }
@@ -57,10 +67,21 @@ void TaskGroup::stop() {
 }
 
 asio::awaitable<void> TaskGroup::stop_on_signal() {
-  asio::signal_set signals{loop_, SIGINT, SIGTERM};
-  const int number = co_await signals.async_wait(asio::use_awaitable);
-  spdlog::info("stopping on {}", number == SIGINT ? "SIGINT" : "SIGTERM");
+  stop_signals_.add(SIGINT);
+  stop_signals_.add(SIGTERM);
+  const int number = co_await stop_signals_.async_wait(asio::use_awaitable);
+  hold_signals();
+  spdlog::info("stopping on {}", name_of(number));
+  ignore_later_signals(false);
   stop();
+}
+
+void TaskGroup::ignore_later_signals(bool is_said) {
+  stop_signals_.async_wait([this, is_said](const boost::system::error_code& error, int number) {
+    if (error || signals_.empty()) return;  // nothing keeps the loop any more
+    if (!is_said) spdlog::info("{} again: it is stopping, and stores what was received", name_of(number));
+    ignore_later_signals(true);
+  });
 }
 
 }  // namespace server::runtime

@@ -7,6 +7,7 @@
 #include <boost/asio/cancellation_signal.hpp>
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/io_context.hpp>
+#include <boost/asio/signal_set.hpp>
 #include <list>
 #include <optional>
 #include <string>
@@ -17,7 +18,7 @@ namespace server::runtime {
 
 class TaskGroup {
  public:
-  explicit TaskGroup(boost::asio::io_context& loop) : loop_{loop} {}
+  explicit TaskGroup(boost::asio::io_context& loop) : loop_{loop}, stop_signals_{loop} {}
 
   // Starts a task. One that throws anything but operation_aborted is logged with its name, stops the group and makes
   // exit_code() 1: the service manager then restarts the station. After stop() nothing starts any more.
@@ -29,7 +30,8 @@ class TaskGroup {
   // Cancels every task; each ends at its next wait.
   void stop();
 
-  // A task that stops the group at SIGINT or SIGTERM.
+  // A task that stops the group at SIGINT or SIGTERM. Those that come later are ignored, with one line: what was
+  // received is still to reach the disk.
   boost::asio::awaitable<void> stop_on_signal();
 
   bool stopping() const { return stopping_; }
@@ -40,8 +42,10 @@ class TaskGroup {
 
  private:
   void ended(const std::string& name, std::exception_ptr failure);
+  void ignore_later_signals(bool is_said);
 
   boost::asio::io_context& loop_;
+  boost::asio::signal_set stop_signals_;  // SAFETY: none of them ends the program while it is there
   std::list<boost::asio::cancellation_signal> signals_;
   ExceptionLog exceptions_;
   bool stopping_ = false;

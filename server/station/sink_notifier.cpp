@@ -83,7 +83,8 @@ void SinkNotifier::publish_event_left_out(const RobotState& robot, std::uint64_t
   for (StationSink* sink : sinks_) sink->on_event_left_out(robot, event_seq);
 }
 
-void SinkNotifier::note(const RobotState& robot, std::string kind, std::string detail, std::string cause) {
+RobotEvent SinkNotifier::event_about(const RobotState& robot, std::string kind, std::string detail,
+                                     std::string cause) const {
   RobotEvent event;
   event.robot_id = robot.id;
   event.boot_id = robot.boot_id;
@@ -97,6 +98,19 @@ void SinkNotifier::note(const RobotState& robot, std::string kind, std::string d
   event.sub_state = robot.context.sub_state;
   event.robot_time_us = robot.latest_robot_time_us;
   event.received_at_us = clock_.utc_us();
+  return event;
+}
+
+void SinkNotifier::note(const RobotState& robot, std::string kind, std::string detail, std::string cause) {
+  publish(robot, event_about(robot, std::move(kind), std::move(detail), std::move(cause)));
+}
+
+void SinkNotifier::note_part(const RobotState& robot, std::string kind, std::string detail, std::string cause,
+                             const BootPart& part) {
+  RobotEvent event = event_about(robot, std::move(kind), std::move(detail), std::move(cause));
+  event.boot_id = part.boot_id;
+  event.robot_time_us = part.from_robot_us;
+  event.value = static_cast<float>(part.length_s);
   publish(robot, event);
 }
 

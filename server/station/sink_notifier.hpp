@@ -38,8 +38,12 @@ class SinkNotifier {
   // An event of the station itself about a robot. Its kind has a row in docs/database.md: tests/check_docs.py compares
   // the table with the literals of the calls.
   void note(const RobotState& robot, std::string kind, std::string detail, std::string cause = "none");
+  // The same of a stretch of time that is over.
+  void note_part(const RobotState& robot, std::string kind, std::string detail, std::string cause,
+                 const BootPart& part);
 
  private:
+  RobotEvent event_about(const RobotState& robot, std::string kind, std::string detail, std::string cause) const;
   template <class Call>
   void each(const runtime::EndedRight& right, Call call);
 

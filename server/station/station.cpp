@@ -134,6 +134,12 @@ void Station::note_model(const RobotId& id, const char* kind, const std::string&
   if (const RobotEntry* entry = parts_->robots.find(id)) parts_->notifier.note(entry->robot, kind, detail);
 }
 
+void Station::note_interruption(const RobotId& id, const BootPart& part, const std::string& reason,
+                                const std::string& detail) {
+  const RobotEntry* entry = parts_->robots.find(id);
+  if (entry != nullptr) parts_->notifier.note_part(entry->robot, "experiment_interrupted", detail, reason, part);
+}
+
 void Station::set_retired(const RobotId& id, std::int64_t retired_at_us, const std::string& actor) {
   RobotEntry* entry = parts_->robots.find(id);
   if (entry == nullptr || entry->robot.retired_at_us == retired_at_us) return;

@@ -32,8 +32,9 @@ RecordingParts::RecordingParts(asio::io_context& loop, runtime::Clock& clock, ru
     : recorder{loop, clock, disk, checkpoints, with_rescue(options, config)},
       head_watch{clock, recorder, checkpoints, options.head_interval},
       reader{options.path, readers},
+      removal_clock{clock},
       digester{clock, recorder, reader},
-      finalizer{clock, recorder, reader, digester, config.give_up_after_days},
+      finalizer{clock, removal_clock, recorder, reader, digester, config.give_up_after_days},
       runs{clock, recorder, reader, digester},
       markers{clock, recorder, reader},
       references{clock, recorder, reader},
@@ -44,10 +45,10 @@ RecordingParts::RecordingParts(asio::io_context& loop, runtime::Clock& clock, ru
       jobs{loop, clock, recorder, reader},
       history{options.path, recorder, readers},
       exports{options.path, recorder, exports_worker},
-      job_files{clock, exports.reader(), options.path.parent_path() / "job-files"},
+      job_files{clock, removal_clock, exports.reader(), options.path.parent_path() / "job-files"},
       disk_watch{clock, readers, options.path, space_limits(config)},
       backups{loop, clock, recorder, readers, disk_watch, backup_folder(options.path, config)},
-      retention{clock, recorder, reader, disk_watch, references, retention_policy(config)},
+      retention{clock, recorder, reader, disk_watch, references, removal_clock, retention_policy(config)},
       groups{clock, recorder, reader},
       path_{options.path} {}
 
@@ -72,6 +73,8 @@ asio::awaitable<RestoredState> RecordingParts::open() {
     auto open = [](SQLite::Database& database) { return database.execAndGet("PRAGMA schema_version").getInt64(); };
     co_await each->ask(std::move(open));
   }
+  auto read_clock = [](SQLite::Database& database) { return read_removal_clock(database); };
+  removal_clock.begin(co_await reader.ask(std::move(read_clock)));  // before this start has written by the clock of now
   co_await head_watch.open();
   backups.set_store_id(restored.store_id);
   std::error_code ignored;
@@ -81,8 +84,8 @@ asio::awaitable<RestoredState> RecordingParts::open() {
   co_await fluid_models.load();
   restored.reservations = co_await reservations.load();
   co_await jobs.load();
-  co_await job_files.open();
   co_await retention.open();
+  co_await job_files.open();
   co_await disk_watch.look();
   co_return restored;
 }
@@ -106,6 +109,7 @@ void RecordingParts::close() {
   for (DatabaseReader* each : {&reader, &history.reader(), &exports.reader()}) each->close();
   recorder.close([this](Database& database, std::int64_t utc_us) {  // what fails is done by the next start
     if (runs.any_open()) RunStore{database}.interrupt(utc_us);
+    store_removal_clock(database.handle(), removal_clock.state());
   });
   head_watch.close();
 }

@@ -60,6 +60,7 @@ struct RecordingParts {
   Recorder recorder;
   HeadWatch head_watch;
   DatabaseReader reader;
+  RemovalClock removal_clock;  // by which things grow old
   RunDigester digester;
   RunFinalizer finalizer;
   Runs runs;

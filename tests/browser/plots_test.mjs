@@ -196,7 +196,7 @@ const steps = {
     await until('nobody else is in control', async () => !/in control\. You may/.test(await text('#control-line')));
     const pad = (change) =>
       page.evaluate((change) => {
-        window.fake_pad ??= { index: 0, id: 'pad', connected: true, axes: [0, 0, 0, 0], buttons: Array.from({ length: 16 }, () => ({ pressed: false })) };
+        window.fake_pad ??= { index: 0, id: 'pad', connected: true, mapping: 'standard', axes: [0, 0, 0, 0], buttons: Array.from({ length: 16 }, () => ({ pressed: false })) };
         if ('axis' in change) window.fake_pad.axes[0] = change.axis;
         if ('held' in change) window.fake_pad.buttons[5].pressed = change.held;
         if ('plugged' in change) window.fake_pad.connected = change.plugged;
@@ -229,6 +229,16 @@ const steps = {
     await page.keyboard.press('Escape');
     await until('it has stopped', async () => (await robot()).mode === 'emergency');
     await rests();
+  },
+
+  async 'the stop button of a gamepad stops, in any view'() {
+    await clear_latch(page);
+    await page.evaluate(() => (location.hash = '#/runs'));
+    await drawn(page);
+    await page.evaluate(() => (window.fake_pad.buttons[1].pressed = true));
+    await until('it has stopped', async () => (await robot()).mode === 'emergency');
+    await page.evaluate(() => (window.fake_pad.buttons[1].pressed = false));
+    await page.goBack();
   },
 
   async 'a value beyond a threshold is announced until it is acknowledged'() {

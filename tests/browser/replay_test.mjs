@@ -229,7 +229,7 @@ const steps = {
     const rows = await command_rows();
     posted.length = 0;
     await page.evaluate(() => {
-      const pad = { index: 0, id: 'pad', connected: true, axes: [1, 1, 0, 0], buttons: Array.from({ length: 16 }, () => ({ pressed: true })) };
+      const pad = { index: 0, id: 'pad', connected: true, mapping: 'standard', axes: [1, 1, 0, 0], buttons: Array.from({ length: 16 }, (_, at) => ({ pressed: at !== 1 })) };
       navigator.getGamepads = () => [pad];
       dispatchEvent(new Event('gamepadconnected'));
     });

@@ -190,6 +190,44 @@ TEST(MissedTicks, OfAnAccelerometerToo) {
   EXPECT_NEAR(*fit.one_sigma[1] / *all.one_sigma[1], 1, 0.1);
 }
 
+// Somebody has moved the robot meanwhile, and put it back: what was measured is wrong, and the duty is true.
+TEST(MissedTicks, WhatIsLeftOutIsSimulatedThroughAndCountsForNothing) {
+  std::vector<double> duty = prbs_duty(0.6, 0.2, 20, kDtS);
+  for (std::size_t k = 800; k < 1200; ++k) duty[k] = 0;
+  const Recording whole = position_run(kFluid, duty, 1e-4, 6);
+  Recording run = whole;
+  run.is_left_out.assign(run.duty.size(), false);
+  for (std::size_t k = 820; k < 1200; ++k) {
+    run.is_left_out[k] = true;
+    run.position_m[k] += 0.05;
+  }
+  const Fit fit = identify(run, one_start()).best, all = identify(whole, one_start()).best;
+  expect_within_sigmas(fit, 3);
+  EXPECT_NEAR(*fit.one_sigma[1] / *all.one_sigma[1], 1, 0.1);
+  EXPECT_NEAR(fit.residual_sd / 1e-4, 1, 0.05);
+  EXPECT_TRUE(fit.residuals_are_white);
+  run.is_left_out.pop_back();
+  EXPECT_THROW(identify(run, one_start()), std::invalid_argument);
+}
+
+TEST(MissedTicks, WhatIsLeftOutOfAnAccelerometerCountsForNothing) {
+  Recording run{kDtS, prbs_duty(0.6, 0.2, 15, kDtS), {}, {}};
+  const Eigen::VectorXd felt_m_s2 = OutputModel::with_means(kDtS, run.duty, 1e-9).output(kFluid);
+  const SensorPath path({std::vector<double>(run.duty.size()), std::vector<bool>(run.duty.size()), false}, kDtS);
+  const Eigen::VectorXd readings = path.sampled(felt_m_s2, {-0.75 * kDtS, kDtS, 0.25 * kDtS});
+  run.acceleration_m_s2.assign(readings.begin(), readings.end());
+  add_noise(run.acceleration_m_s2, 0.01, 5);
+  run.is_left_out.assign(run.duty.size(), false);
+  for (std::size_t k = 500; k < 700; ++k) {
+    run.is_left_out[k] = true;
+    run.acceleration_m_s2[k] += 0.5;
+  }
+  const Fit fit = identify(run, one_start()).best;
+  ASSERT_TRUE(fit.sensor);
+  EXPECT_GE(fit.sensor->readings_left_out, 200U);
+  expect_within_sigmas(fit, 3);
+}
+
 TEST(MissedTicks, AreNamedWithHowManyAndWhere) {
   const auto ticks = most_ticks(1001, 0, 4);
   const Recording run = sampled_at(position_run(kFluid, held(prbs_duty(0.6, 0.2, 10, kDtS), ticks), 1e-4, 5), ticks);

@@ -84,7 +84,9 @@ TEST_F(ConfigTest, TheDocumentedFileHoldsEveryDefault) {
   EXPECT_EQ(from_file.recording.low_space_mb, defaults.recording.low_space_mb);
   EXPECT_EQ(from_file.recording.critical_space_mb, defaults.recording.critical_space_mb);
   EXPECT_EQ(from_file.recording.backup_dir, defaults.recording.backup_dir);
-  EXPECT_EQ(from_file.allow_unattended, defaults.allow_unattended);
+  EXPECT_EQ(from_file.any_file_system, defaults.any_file_system);
+  EXPECT_EQ(from_file.experiments.allow_unattended, defaults.experiments.allow_unattended);
+  EXPECT_EQ(from_file.experiments.back_within_s, defaults.experiments.back_within_s);
   EXPECT_EQ(from_file.foxglove, defaults.foxglove);
   EXPECT_EQ(from_file.real_time, defaults.real_time);
   EXPECT_EQ(from_file.log_level, defaults.log_level);

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
+#include <regex>
 
 namespace server {
 namespace {
@@ -62,6 +63,9 @@ TEST(Log, JsonHasTimeLevelAndTheMessageAsItWas) {
 
 TEST(Log, TextShowsWhatWasEscaped) {
   EXPECT_THAT(line_of("text", "a\nb\x1b[1m"), ::testing::EndsWith("  a\\nb\\x1b[1m\n"));
+  EXPECT_TRUE(
+      std::regex_search(line_of("text", "a"), std::regex{R"(^\d{4}-\d\d-\d\d \d\d:\d\d:\d\d\.\d{3} [+-]\d\d:\d\d  )"}))
+      << "its zone is named";
   EXPECT_THAT(line_of("text", "C:\\data \xc3\xa4"), ::testing::EndsWith("  C:\\data \xc3\xa4\n"));
 }
 

@@ -1,4 +1,5 @@
 """A live station is backed up, the backup restored, and the robot goes on with the restored station."""
+import contextlib
 import fcntl
 import pathlib
 import sqlite3
@@ -105,6 +106,24 @@ class BackupTest(unittest.TestCase):
                 (folder / name).write_text("a copy")
             self.assertEqual(tool("backup", "--data", place.data, "--to", place.folder / "copy.sqlite")[0], 0)
             self.assertEqual({path.name for path in folder.iterdir()}, others)
+
+    def test_a_schema_that_no_version_wrote_is_refused(self):
+        with lab() as place:
+            place.start_station()
+            self.assertEqual(place.stop_station(), 0)
+            copy, target = place.folder / "copy.sqlite", place.folder / "restored"
+            for change in ("CREATE TRIGGER x AFTER INSERT ON run BEGIN DELETE FROM run; END", "CREATE VIEW y AS SELECT 1",
+                           "DROP TRIGGER audit_kept", "CREATE TABLE z (a)",
+                           "PRAGMA writable_schema = ON; INSERT INTO sqlite_schema VALUES ('trigger', 'sqlite_x', 'run', 0, "
+                           "'CREATE TRIGGER sqlite_x AFTER INSERT ON run BEGIN DELETE FROM run; END')"):
+                copy.unlink(missing_ok=True)
+                self.assertEqual(tool("backup", "--data", place.data, "--to", copy)[0], 0)
+                with contextlib.closing(sqlite3.connect(copy)) as database:
+                    database.executescript(change)
+                status, _, error = tool("restore", "--from", copy, "--data", target)
+                self.assertEqual(status, 1)
+                self.assertIn("no version of this program wrote its ", error)
+                self.assertFalse((target / "station.sqlite").exists())
 
     def test_a_damaged_backup_is_refused(self):
         with lab() as place:

@@ -1,12 +1,18 @@
 """A run of a real station as an .eln archive: saved, computed again, damaged, packed anew by another program."""
 
+import contextlib
+import hashlib
+import json
+import os
 import pathlib
+import sqlite3
 import subprocess
 import time
 import unittest
+import warnings
 import zipfile
 
-from processes import commanded, lab
+from processes import BIN, commanded, lab
 
 VALIDATOR = pathlib.Path(__file__).with_name("validate_crate.mjs")
 
@@ -75,6 +81,61 @@ class CapsuleTest(unittest.TestCase):
             found = self.reproduce(place, file)
             self.assertEqual(found.returncode, 1, found.stderr)
             self.assertIn(f"run-{run}/samples.csv", found.stdout)
+
+    def test_a_strangers_archive_ends_in_words_and_leaves_nothing(self):
+        """Two entries of one name, names that climb, a bomb, depth, a database with a view, a fifo, control characters."""
+        with lab() as place:
+            station = place.start_station()
+            run = self.record(place, station)
+            good = place.folder / "run.eln"
+            self.assertEqual(place.tool("capsule", run, "--to", good, "--data", place.data).returncode, 0)
+            place.kill_station()
+            scratch, bad = place.folder / "tmp", place.folder / "bad.eln"
+            scratch.mkdir()
+            with zipfile.ZipFile(good) as archive:
+                entries = [(name, archive.read(name)) for name in archive.namelist()]
+            folder = entries[0][0].split("/")[0]
+            forged = place.folder / "forged.sqlite"
+            forged.write_bytes(dict(entries)[f"{folder}/samples.sqlite"])
+            with contextlib.closing(sqlite3.connect(forged)) as database:
+                database.executescript("ALTER TABLE sample RENAME TO s; CREATE VIEW sample AS SELECT * FROM s")
+
+            def packed(change, rehash=()):
+                files = change(list(entries))
+                for name in rehash:  # as a stranger does who knows how
+                    at = next(i for i, (entry, _) in enumerate(files) if entry.endswith("ro-crate-metadata.json"))
+                    crate = json.loads(files[at][1])
+                    for one in crate["@graph"]:
+                        if one["@id"] == name:
+                            one["sha256"] = hashlib.sha256(dict(files)[f"{folder}/{name}"]).hexdigest()
+                    files[at] = (files[at][0], json.dumps(crate).encode())
+                with warnings.catch_warnings(), zipfile.ZipFile(bad, "w", zipfile.ZIP_DEFLATED) as archive:
+                    warnings.simplefilter("ignore")  # of two entries of one name
+                    for name, content in files:
+                        archive.writestr(name, content)
+
+            def replaced(name, content):
+                return lambda files: [(entry, content if entry.endswith("/" + name) else old) for entry, old in files]
+
+            metrics = next(name for name, _ in entries if name.endswith("metrics.json"))
+            for change, rehash, said in (
+                    (lambda files: [*files, (metrics, b"{}")], (), "it has two entries"),
+                    (lambda files: [*files, ("../../climbs", b"")], (), "which is no plain path"),
+                    (lambda files: [*files, ("/etc/x", b"")], (), "which is no plain path"),
+                    (lambda files: [*files, (f"{folder}/\x1b]0;x\x07", b"")], (), "\\x1B]0;x\\x07"),
+                    (lambda files: [*files, *((f"{folder}/{i}", b"") for i in range(1100))], (), "it has more than 1000 entries"),
+                    (replaced("samples.sqlite", bytes(400_000_000)), (), "times the archive"),
+                    (replaced("metrics.json", b"[" * 200_000), ("metrics.json",), "metrics.json is not a JSON object"),
+                    (replaced("samples.sqlite", forged.read_bytes()), ("samples.sqlite",), "cannot read samples.sqlite")):
+                packed(change, rehash)
+                found = subprocess.run([str(BIN / "rheonaut"), "reproduce", str(bad)], capture_output=True, text=True,
+                                       timeout=60, env=os.environ | {"TMPDIR": str(scratch)})
+                self.assertIn(found.returncode, (1, 2), found.stdout + found.stderr)
+                self.assertIn(said, found.stdout + found.stderr)
+                self.assertNotIn("\x1b", found.stdout + found.stderr)
+                self.assertEqual(list(scratch.iterdir()), [])
+            os.mkfifo(place.folder / "fifo.eln")
+            self.assertEqual(self.reproduce(place, place.folder / "fifo.eln").returncode, 1)
 
     def test_what_is_no_archive_of_a_run_is_refused(self):
         with lab() as place:

@@ -364,11 +364,11 @@ class DoctorTest(unittest.TestCase):
             self.assertNotIn("damage", found[0]["what"] + found[0]["action"])
             self.assertEqual(code, 1)
 
-    def test_too_few_open_files(self):
-        def few():
-            resource.setrlimit(resource.RLIMIT_NOFILE, (500, 500))
+    def test_limits_that_are_too_tight(self):
         with self.stopped() as place:
-            self.expect_problem(place, "open files", "500 are allowed", preexec_fn=few)
+            for limit, most, said in ((resource.RLIMIT_NOFILE, 500, "500 open files are allowed"),
+                                      (resource.RLIMIT_FSIZE, 5_000_000, "a file may grow to 5 MB only")):
+                self.expect_problem(place, "limits", said, preexec_fn=lambda: resource.setrlimit(limit, (most, most)))
 
     def test_a_loop_without_real_time_priority(self):
         soft, hard = resource.getrlimit(resource.RLIMIT_RTPRIO)

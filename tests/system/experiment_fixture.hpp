@@ -148,7 +148,8 @@ class ExperimentTest : public SystemTest {
 
   void make(bool allow_unattended) {
     const server::experiments::DriverParts parts{loop, clock, tasks, station};
-    experiments = std::make_unique<server::experiments::Experiments>(parts, *recording, maths, allow_unattended);
+    experiments = std::make_unique<server::experiments::Experiments>(
+        parts, *recording, maths, config::ExperimentRules{.allow_unattended = allow_unattended});
     tasks.spawn("experiments", experiments->run());
     clock.run_for(50ms);
   }

@@ -2,8 +2,11 @@
 import contextlib
 import json
 import os
+import pty
 import random
 import re
+import select
+import signal
 import sqlite3
 import subprocess
 import threading
@@ -107,6 +110,49 @@ class ExperimentsTest(unittest.TestCase):
             done = place.tool("experiment", "take-over", left_alone["experiment_id"], "--wait", "--data", place.data)
             self.assertIn(done.returncode, (0, 5), done.stderr)  # 5: a machine that stood still
             self.assertNotEqual(station.get(f"/api/v1/experiments/{left_alone['experiment_id']}")["state"], "waiting")
+
+    def test_a_key_pauses_the_count_down(self):
+        """The simulator stands still for 1.5 s in a duty; at the terminal of who waits a key is pressed."""
+        with lab() as place:
+            station = place.start_station()
+            robot = place.start_robot(station, "sim-1", "--sensor", "perfect")
+            station.wait_for_robot("sim-1")
+            profile = place.folder / "duty.json"
+            profile.write_text(json.dumps({**DUTY, "step": [{"kind": "duty", "duty": 0.2, "for_s": 60}]}))
+            command = [str(BIN / "rheonaut"), "experiment", "begin", str(profile), "--robot", "sim-1", "--wait",
+                       "--data", str(place.data)]
+            pid, terminal = pty.fork()
+            if pid == 0:
+                os.execv(command[0], command)
+            try:
+                self.read_until(terminal, b"running: run 1 of 1, step 1 of 1, 2 of 60 s")
+                robot.send_signal(signal.SIGSTOP)
+                time.sleep(1.5)
+                robot.send_signal(signal.SIGCONT)
+                self.read_until(terminal, b"(any key pauses it)")
+                os.write(terminal, b"x")
+                self.read_until(terminal, b"has paused it")
+                one = station.get("/api/v1/experiments?limit=1")["experiments"][0]
+                self.assertEqual((one["state"], one["reason"], one["progress"]["goes_on_in_s"]),
+                                 ("paused", "requested", None))
+                time.sleep(4)  # longer than the count-down
+                self.assertEqual(station.robot("sim-1")["sample"]["duty"], 0)
+                station.request("POST", f"/api/v1/experiments/{one['experiment_id']}/abort")
+                with contextlib.suppress(OSError):  # its end
+                    while os.read(terminal, 4096):
+                        pass
+            finally:
+                os.waitpid(pid, 0)
+                os.close(terminal)
+            run = station.get(f"/api/v1/runs/{station.get('/api/v1/runs?limit=1')['runs'][0]['run_id']}")
+            self.assertEqual(len(run["interrupted"]), 1, run["interrupted"])
+            self.assertNotEqual(run["interrupted"][0]["reason"], "requested")  # but why it was interrupted
+
+    def read_until(self, terminal, wanted):
+        shown = b""
+        while wanted not in shown:
+            self.assertTrue(select.select([terminal], [], [], 60)[0], shown)
+            shown += os.read(terminal, 4096)
 
     def test_the_pump_of_the_simulator_is_set_by_a_person_and_stored_with_the_run(self):
         with lab() as place:

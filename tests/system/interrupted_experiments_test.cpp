@@ -1,49 +1,13 @@
 // An experiment whose link, command, samples or client were late: the robot rests, and it goes on where it was broken
 // off; or it does not, where it must not.
-#include <cstdlib>
-#include <random>
-
-#include "server/experiments/profile_document.hpp"
-#include "tests/system/experiment_fixture.hpp"
+#include "server/analysis/run_recording.hpp"
+#include "tests/system/interrupted_fixture.hpp"
 
 namespace server {
 namespace {
 
-using namespace server::experiments;
-
 constexpr const char* kDuty = "kind = \"duty\"\nduty = 0.2\nfor_s = 8";
 constexpr const char* kSetpoint = "kind = \"setpoint\"\nsetpoint_m = 0.1\nfor_s = 8";
-
-class InterruptedTest : public ExperimentTest {
- protected:
-  InterruptedTest() { begin(); }
-
-  double duty() const { return robot->simulated().motor_duty(); }
-  void lose_link(microseconds for_us) {
-    robot->redial = false;
-    robot->cut();
-    clock.run_for(for_us);
-    robot->redial = true;
-    if (!robot->connected()) robot->dial(*listener);
-  }
-  // It is interrupted, and the robot rests.
-  void expect_interrupted(storage::ExperimentId id, const std::string& reason) {
-    ASSERT_TRUE(clock.run_until([&] { return view(id).experiment.state == ExperimentState::paused; }, 3s));
-    EXPECT_EQ(view(id).experiment.reason, reason) << view(id).experiment.detail;
-    ASSERT_TRUE(clock.run_until([&] { return duty() == 0; }, 2s));
-  }
-  std::size_t driven(storage::ExperimentId id) {
-    const auto is_driven = [](const storage::StoredSample& one) { return one.sample.duty != 0; };
-    return static_cast<std::size_t>(std::ranges::count_if(samples_of_first_run(id), is_driven));
-  }
-  static std::string shipped(const std::string& name) {
-    const auto found = std::ranges::find(shipped_profiles(), name, &base::EmbeddedFile::name);
-    return std::string{found->content};
-  }
-  std::size_t begins(storage::ExperimentId id) {
-    return nlohmann::json::parse(view(id).experiment.runs.at(0).steps).size();
-  }
-};
 
 TEST_F(InterruptedTest, ADutyGoesOnWhereALostLinkBrokeItOff) {
   const auto id = start(profile({kDuty}));
@@ -57,6 +21,72 @@ TEST_F(InterruptedTest, ADutyGoesOnWhereALostLinkBrokeItOff) {
   until(id, ExperimentState::done);
   EXPECT_EQ(begins(id), 1U);
   EXPECT_NEAR(static_cast<double>(driven(id)), 800, 20);
+}
+
+// From the tick at which the motor went off to the one at which the line goes on.
+TEST_F(InterruptedTest, ItIsMarkedInItsRun) {
+  const auto id = start(profile({"kind = \"rest\"\nfor_s = 1", "kind = \"duty\"\nduty = 0.2\nfor_s = 12"}));
+  clock.run_for(3s);
+  lose_link(1400ms);
+  until(id, ExperimentState::done);
+  const auto samples = samples_of_first_run(id);
+  const storage::Run run = run_of(id);
+  ASSERT_EQ(run.interrupted.size(), 1U);
+  const storage::InterruptedPart& part = run.interrupted.front();
+  EXPECT_EQ(part.reason, "link_lost");
+  EXPECT_NE(part.detail.find("the link to the robot was away for 1."), std::string::npos) << part.detail;
+  EXPECT_EQ(part.span, 0U);
+  std::size_t driven_before = 0, driven_after = 0;
+  for (const storage::StoredSample& stored : samples) {
+    if (stored.sample.duty == 0) continue;
+    driven_before += stored.robot_time_us < part.from_robot_us ? 1 : 0;
+    driven_after += stored.robot_time_us >= part.to_robot_us ? 1 : 0;
+  }
+  EXPECT_EQ(driven_before + driven_after, driven(id)) << "no motor in the part";
+  EXPECT_GT(driven_before, 200U);
+  EXPECT_GT(driven_after, 200U);
+  const auto recorded = analysis::recording_of({samples, {}, run.interrupted}, {});
+  ASSERT_TRUE(recorded) << recorded.error().detail;
+  const auto left_out = std::ranges::count(recorded->recording.is_left_out, true);
+  EXPECT_NEAR(static_cast<double>(left_out), static_cast<double>(part.to_robot_us - part.from_robot_us) / 1e4, 2);
+  ASSERT_FALSE(recorded->warnings.empty());
+  EXPECT_NE(recorded->warnings.front().find("(link_lost)"), std::string::npos) << recorded->warnings.front();
+}
+
+// Also where it is aborted before it goes on, and where a person paused it.
+TEST_F(InterruptedTest, WhatDoesNotGoOnIsMarkedToo) {
+  const auto id = start(profile({kDuty}));
+  clock.run_for(2s);
+  const station::Author by{"anna", "127.0.0.1", 0};
+  ASSERT_TRUE(wait_for(experiments->pause(id, by)));
+  clock.run_for(20s);
+  abort_aside(id);
+  until(id, ExperimentState::aborted);
+  const auto samples = samples_of_first_run(id);
+  const storage::Run run = run_of(id);
+  ASSERT_EQ(run.interrupted.size(), 1U);
+  EXPECT_EQ(run.interrupted.front().reason, "requested");
+  const auto recorded = analysis::recording_of({samples, {}, run.interrupted}, {});
+  ASSERT_FALSE(recorded);
+  EXPECT_EQ(recorded.error().reason, "too_little_usable");
+  EXPECT_NE(recorded.error().detail.find("can be fitted, less than 50 %"), std::string::npos)
+      << recorded.error().detail;
+  analysis::RunWindow before;
+  before.to_s = 2;
+  EXPECT_TRUE(analysis::recording_of({samples, {}, run.interrupted}, before)) << "a part that somebody chooses";
+}
+
+TEST_F(InterruptedTest, ProgressStandsStillMeanwhile) {
+  const auto id = start(profile({kDuty}));
+  clock.run_for(3s);
+  lose_link(700ms);
+  expect_interrupted(id, "link_lost");
+  clock.run_for(1s);
+  const double elapsed_s = view(id).progress->elapsed_s;
+  clock.run_for(1s);
+  EXPECT_EQ(view(id).experiment.state, ExperimentState::paused);
+  EXPECT_DOUBLE_EQ(view(id).progress->elapsed_s, elapsed_s);
+  until(id, ExperimentState::done);
 }
 
 TEST_F(InterruptedTest, AClosedLoopStepBeginsAgain) {
@@ -245,32 +275,5 @@ TEST_F(InterruptedTest, BeforeARunItWaitsForTheLink) {
 }
 
 // Ten outages of 0.2 to 3 s at any moment of the profile that a fit needs: deploy says how many seeds.
-TEST_F(InterruptedTest, AnIdentificationSurvivesTenOutages) {
-  const char* given = std::getenv("RHEONAUT_OUTAGE_SEEDS");
-  const int seeds = given == nullptr ? 1 : std::stoi(given);
-  int done = 0;
-  for (int seed = 1; seed <= seeds; ++seed) {
-    std::mt19937 random(static_cast<unsigned>(seed));
-    std::uniform_int_distribution<int> between_ms(1000, 18'000), away_ms(200, 3000);
-    const auto id = start(shipped("identification_set"));
-    for (int outage = 0; outage < 10; ++outage) {
-      clock.run_for(std::chrono::milliseconds(between_ms(random)));
-      if (random() % 2 == 0) {
-        lose_link(std::chrono::milliseconds(away_ms(random)));
-      } else {
-        robot->stall(true);
-        clock.run_for(std::chrono::milliseconds(away_ms(random)));
-        robot->stall(false);
-      }
-    }
-    clock.run_until([&] { return storage::has_ended(view(id).experiment.state); }, 1000s);
-    const auto ended = view(id).experiment;
-    done += ended.state == ExperimentState::done ? 1 : 0;
-    if (ended.state != ExperimentState::done)
-      std::printf("seed %d: %s: %s\n", seed, ended.reason.c_str(), ended.detail.c_str());
-  }
-  EXPECT_GE(done * 20, seeds * 19);
-}
-
 }  // namespace
 }  // namespace server

@@ -25,7 +25,7 @@ class ThreeTonesExperiment : public ExperimentTest {
   // What a job tune_measured measures of the run.
   control::MeasuredPlant measure(const storage::Experiment& experiment) {
     const auto samples = samples_of(experiment.runs.at(0).run.value());
-    const auto recorded = analysis::recording_of(samples, {}, nullptr, analysis::ChannelChoice::robot);
+    const auto recorded = analysis::recording_of({samples, {}, {}}, {}, analysis::ChannelChoice::robot);
     EXPECT_TRUE(recorded) << recorded.error().detail;
     const control::Recording& recording = recorded->recording;
     control::ToneRecord record{recording.duty, recording.acceleration_m_s2, recording.dt_s};

@@ -12,6 +12,10 @@ export type ExperimentState = ExperimentSummary['state'];
 export const kOpenStates: readonly ExperimentState[] = ['running', 'paused', 'aborting', 'waiting'];
 export const has_ended = (experiment: Pick<ExperimentSummary, 'state'>) => !kOpenStates.includes(experiment.state);
 
+// After an interruption, before it goes on by itself.
+export const counts_down = ({ progress }: Pick<ExperimentSummary, 'progress'>) =>
+  typeof progress?.goes_on_in_s === 'number';
+
 // Of a page, or a script, by its actor and its id.
 export const is_in_hands_of = (
   experiment: Pick<ExperimentSummary, 'acts_for' | 'client'>,

@@ -46,6 +46,15 @@ export function keep_menus_shut(target: Pick<Window, 'addEventListener'>): void 
   });
 }
 
+// Calls act() on each press of a key, a button or a finger, wherever it is; it takes none of them away.
+export function listen_for_any_press(target: Pick<Window, 'addEventListener'>, act: () => void): void {
+  const listener = (event: Event) => {
+    if (!(event as KeyboardEvent).repeat) act();
+  };
+  for (const kind of ['keydown', 'pointerdown'])
+    target.addEventListener(kind, listener, { capture: true, passive: true });
+}
+
 const kChord_ms = 1500;
 const kTakesLetters = 'input, textarea, select, [contenteditable], [role=combobox], [role=listbox]';
 
@@ -81,6 +90,10 @@ export const kShortcuts: readonly { keys: string[]; what: string }[] = [
   {
     keys: ['Esc'],
     what: 'Stops the robot that the red button names; without one, every robot. From every field, list and panel; what is open closes as well.',
+  },
+  {
+    keys: ['right button of a gamepad'],
+    what: 'The right one of its four (B, circle) stops as Escape does, in every view; not in a hidden page.',
   },
   { keys: ['Space'], what: 'Never stops. It belongs to “Hold to run” and to text; in a replay it plays and pauses.' },
   {

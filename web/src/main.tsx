@@ -2,7 +2,9 @@
 
 import './styles';
 import { render } from 'preact';
-import { keep_menus_shut, listen_for_stop_key, listen_for_view_keys } from './keys';
+import { pause_count_downs } from './count_downs';
+import { listen_for_stop_of_pads } from './gamepad';
+import { keep_menus_shut, listen_for_any_press, listen_for_stop_key, listen_for_view_keys } from './keys';
 import { follow_build, served_html } from './page_build';
 import { follow_address } from './route';
 import { Session } from './session';
@@ -12,7 +14,9 @@ import { Cockpit, open_view } from './views/cockpit';
 const session = new Session();
 follow_address(window);
 listen_for_stop_key(window, session.stop_selected);
+listen_for_stop_of_pads(session.stop_selected);
 listen_for_view_keys(window, open_view);
+listen_for_any_press(window, () => pause_count_downs(session));
 keep_menus_shut(window);
 follow_build({
   own_html: document.documentElement.outerHTML,

@@ -9,8 +9,8 @@ type Where = Pick<Route, 'view' | 'parts'>;
 
 export const shows_past = ({ view, parts }: Where): boolean => view === 'runs' && parts[1] === 'replay';
 
-// Stops, and what concerns this page and its session.
-const kAllowed = /\/(emergency-stop|login|logout|recording\/losses\/acknowledge)$/;
+// Stops, what keeps an experiment at rest, and what concerns this page and its session.
+const kAllowed = /\/(emergency-stop|login|logout|recording\/losses\/acknowledge|experiments\/\d+\/(pause|abort))$/;
 
 export function is_refused_in_past(now: Where, method: string, path: string, body: unknown): boolean {
   return shows_past(now) && method !== 'GET' && !kAllowed.test(path) && !ends_duty(body);

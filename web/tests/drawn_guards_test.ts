@@ -3,7 +3,9 @@
 import { signal } from '@preact/signals';
 import { h, render, type ComponentType } from 'preact';
 import { afterEach, beforeEach, expect, test, vi } from 'vitest';
+import { pause_count_downs } from '../src/count_downs';
 import type { ExperimentSummary } from '../src/experiments_store';
+import { listen_for_any_press } from '../src/keys';
 import { GamepadLine } from '../src/parts/gamepad_line';
 import { AlertLine, alerts_of, thresholds } from '../src/parts/threshold_list';
 import { resting_place, Vessel } from '../src/parts/vessel';
@@ -214,6 +216,39 @@ test('a page that is cut off resumes no experiment, and aborts one even while an
   acts.pending.value = 'pause';
   page.find('abort-experiment')!.fire('Click');
   expect(asked).toEqual(['abort']);
+});
+
+test('any key or press pauses an experiment of this page that is about to go on by itself, and no other', async () => {
+  const { store } = store_with(robot('b'));
+  const counting = { progress: { goes_on_in_s: 2 }, client: store.client.value };
+  store.experiments.take_answer(
+    [
+      experiment({ ...counting, experiment_id: 1, acts_for: store.actor.value }),
+      experiment({ ...counting, experiment_id: 2, acts_for: 'session:2' }),
+      experiment({ ...counting, experiment_id: 3, acts_for: store.actor.value, progress: { goes_on_in_s: null } }),
+    ],
+    store.experiments.mark(),
+  );
+  const paused: number[] = [];
+  const pause = (id: number) => Promise.resolve(void paused.push(id));
+  const heard = new Map<string, (event: Event) => void>();
+  const target = { addEventListener: (kind: string, listener: (event: Event) => void) => heard.set(kind, listener) };
+  listen_for_any_press(target as never, () => pause_count_downs({ store, experiments: { pause } } as never));
+  heard.get('keydown')!({ repeat: true } as KeyboardEvent);
+  expect(paused).toEqual([]);
+  heard.get('keydown')!({ repeat: false } as KeyboardEvent);
+  heard.get('pointerdown')!({} as PointerEvent);
+  expect(paused).toEqual([1, 1]);
+  const session = {
+    store,
+    me: signal({ role: 'operator', scopes: 'command' }),
+    phase: signal('live'),
+    experiments: {},
+  };
+  const acts = { pending: signal(''), problem: signal(''), act: () => undefined };
+  const page = drawn(ActsOfOne, { session, experiment: store.experiments.find(1), acts } as never);
+  expect(page.find('pause-experiment')).toBeTruthy();
+  expect(page.find('resume-experiment')).toBeFalsy();
 });
 
 test('an experiment that goes on selects its robot for the stop when it is opened', async () => {

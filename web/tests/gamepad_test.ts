@@ -1,7 +1,7 @@
 // A duty by a gamepad: it runs while a shoulder button is held and the stick is pushed, and in no other moment.
 import { expect, test, vi } from 'vitest';
 import { DutyHold } from '../src/duty_hold';
-import { duty_of_axis, GamepadHold, kFrameless_ms, kWatch_ms, type Pad } from '../src/gamepad';
+import { duty_of_axis, GamepadHold, GamepadStop, kFrameless_ms, kStill_ms, kWatch_ms, type Pad } from '../src/gamepad';
 import { FakeTime } from './fakes';
 
 const kFrame_ms = 16;
@@ -14,10 +14,14 @@ function page() {
     duties: [] as number[],
     frozen: false,
     why_not: '',
+    full_duty: 0.5,
     axis: 0,
     shoulder: false,
     index: 0,
     plugged: true,
+    mapping: 'standard' as GamepadMappingType,
+    noise: 0,
+    others: [] as Pad[],
   };
   const hold = new DutyHold({
     set_duty: (_, duty) => {
@@ -34,7 +38,18 @@ function page() {
   const get_gamepads = (): (Pad | null)[] => {
     if (!world.plugged) return [null, null];
     const buttons = Array.from({ length: 16 }, (_, at) => ({ pressed: at === 5 && world.shoulder }));
-    return [null, { index: world.index, id: 'pad', connected: true, axes: [world.axis, 0, 0, 0], buttons }];
+    return [
+      null,
+      {
+        index: world.index,
+        id: 'pad',
+        connected: true,
+        mapping: world.mapping,
+        axes: [world.axis, 0, 0, world.noise],
+        buttons,
+      },
+      ...world.others,
+    ];
   };
   vi.stubGlobal('navigator', { getGamepads: get_gamepads });
   const pad = new GamepadHold({
@@ -42,7 +57,7 @@ function page() {
     now_ms: () => time.now_ms,
     robot_id: 'rheo-1',
     why_not: () => world.why_not,
-    full_duty: () => 0.5,
+    full_duty: () => world.full_duty,
     hold,
   });
   time.set(() => !world.frozen && pad.frame(), kFrame_ms, kFrame_ms);
@@ -109,6 +124,113 @@ test('unplugged is duty 0, and plugged in again with the button down it starts n
   world.shoulder = true;
   await frames();
   expect(world.duties).toEqual([0.5, 0, 0.5]);
+});
+
+test('a pad that says nothing new for 5 s ends its duty, and goes on when it is moved', async () => {
+  const { world, pad, hold, drive, frames } = page();
+  await drive();
+  await world.time.advance(kStill_ms - 200);
+  expect(world.duties).toEqual([0.5]);
+  expect(pad.still_left_ms).toBeLessThan(200);
+  await world.time.advance(400);
+  expect(world.duties).toEqual([0.5, 0]);
+  expect(pad.is_asleep).toBe(true);
+  await world.time.advance(60_000); // frozen for good
+  expect(world.duties).toEqual([0.5, 0]);
+  world.axis = 0.56;
+  await frames();
+  expect(world.duties).toEqual([0.5, 0, 0.25]);
+  expect(hold.robot_id).toBe('rheo-1');
+  await world.time.advance(kStill_ms + 200);
+  Object.assign(world, { shoulder: false });
+  await frames();
+  expect(world.duties).toEqual([0.5, 0, 0.25, 0]);
+});
+
+test('a frozen pad starts nothing when the slider leaves 0', async () => {
+  const { world, drive, frames } = page();
+  await drive();
+  world.full_duty = 0;
+  await frames();
+  await world.time.advance(kStill_ms + 200);
+  world.full_duty = 0.5;
+  await frames(20);
+  expect(world.duties).toEqual([0.5, 0]);
+});
+
+test('what has ended while a pad slept is not revived by moving it', async () => {
+  const { world, pad, drive, frames } = page();
+  await drive();
+  await world.time.advance(kStill_ms + 200);
+  pad.end(); // lost focus
+  world.axis = 0.56;
+  await frames(20);
+  expect(world.duties).toEqual([0.5, 0]);
+});
+
+test('a pad with noise on any axis is never asked', async () => {
+  const { world, drive } = page();
+  world.time.set(() => (world.noise = (world.noise + 0.001) % 0.01), 100, 100);
+  await drive();
+  await world.time.advance(4 * kStill_ms);
+  expect(world.duties).toEqual([0.5]);
+});
+
+test('a pad that appears ends the duty, and of two none drives before one is chosen', async () => {
+  const { world, pad, drive, frames, hold } = page();
+  await drive();
+  const buttons = Array.from({ length: 16 }, (_, at) => ({ pressed: at === 5 }));
+  const again: Pad = { index: 3, id: 'pad', connected: true, mapping: 'standard', axes: [-1, 0, 0, 0], buttons };
+  world.others = [again]; // the same pad, come back while its first half is frozen
+  await frames(20);
+  expect(world.duties).toEqual([0.5, 0]);
+  pad.choose(again);
+  await frames(20);
+  expect(world.duties).toEqual([0.5, 0]); // its button is down already
+  const up = { ...again, buttons: buttons.map(() => ({ pressed: false })) };
+  world.others = [up];
+  await frames();
+  world.others = [again];
+  await frames();
+  expect(world.duties).toEqual([0.5, 0, -0.5]);
+  world.others = [];
+  await frames(20);
+  expect(world.duties).toEqual([0.5, 0, -0.5, 0]);
+  expect(hold.robot_id).toBeNull();
+});
+
+test('a layout that is not known is not read', async () => {
+  const { world, pad, drive } = page();
+  world.mapping = '';
+  await drive();
+  expect(world.duties).toEqual([]);
+  expect(pad.pads.length).toBe(1);
+});
+
+test('one button of every pad stops, once a press, also of a pad that does not drive', () => {
+  let stops = 0;
+  const button = new GamepadStop();
+  const pads = (pressed: number[], mapping: GamepadMappingType = 'standard'): Pad[] =>
+    [0, 1].map((index) => ({
+      index,
+      id: 'pad',
+      connected: true,
+      mapping,
+      axes: [],
+      buttons: Array.from({ length: 16 }, (_, at) => ({ pressed: at === 1 && pressed.includes(index) })),
+    }));
+  const frame = (these: (Pad | null)[]) => button.frame(these, () => (stops += 1));
+  frame([null, ...pads([])]);
+  expect(stops).toBe(0);
+  for (let count = 0; count < 10; ++count) frame(pads([0]));
+  expect(stops).toBe(1);
+  frame(pads([0, 1]));
+  expect(stops).toBe(2);
+  frame(pads([]));
+  frame(pads([1]));
+  expect(stops).toBe(3);
+  frame(pads([0, 1], ''));
+  expect(stops).toBe(3);
 });
 
 test('another pad in its place is not the same hand', async () => {

@@ -25,6 +25,9 @@ test('only reading, stops and the page’s own session get through, and what end
   expect(refused('POST', '/robots/a/emergency-stop')).toBe(false);
   expect(refused('POST', '/emergency-stop')).toBe(false);
   expect(refused('POST', '/logout')).toBe(false);
+  expect(refused('POST', '/experiments/7/pause')).toBe(false);
+  expect(refused('POST', '/experiments/7/abort')).toBe(false);
+  expect(refused('POST', '/experiments/7/resume')).toBe(true);
   expect(refused('GET', '/robots/a/commands')).toBe(false);
   expect(refused('POST', '/robots/a/commands', { kind: 'set_duty', duty: 0 })).toBe(false);
   expect(refused('POST', '/robots/a/commands', { kind: 'set_setpoint', setpoint_m: 0 })).toBe(true);

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <fstream>
+#include <set>
 #include <stdexcept>
 
 #include "server/analysis/capsule/archive_writer.hpp"
@@ -23,7 +24,8 @@ std::unexpected<Error> damaged(const std::string& name) {
 
 }  // namespace
 
-ArchiveReader::ArchiveReader(std::filesystem::path path) : path_{std::move(path)}, zip_{unzOpen64(path_.c_str())} {
+ArchiveReader::ArchiveReader(std::filesystem::path path) : path_{std::move(path)} {
+  if (std::filesystem::is_regular_file(path_)) zip_ = unzOpen64(path_.c_str());  // a fifo would be waited for
   if (zip_ == nullptr) throw std::runtime_error{fmt::format("{} is no zip archive, or damaged", path_.string())};
 }
 
@@ -31,14 +33,33 @@ ArchiveReader::~ArchiveReader() { unzClose(zip_); }
 
 std::vector<std::string> ArchiveReader::names() {
   std::vector<std::string> all;
-  for (int found = unzGoToFirstFile(zip_); found == UNZ_OK; found = unzGoToNextFile(zip_)) {
+  for (int found = unzGoToFirstFile(zip_); found == UNZ_OK && all.size() <= kMostEntries;
+       found = unzGoToNextFile(zip_)) {
     std::string name(kLongestName, '\0');
     unz_file_info64 about{};
     if (unzGetCurrentFileInfo64(zip_, &about, name.data(), name.size(), nullptr, 0, nullptr, 0) != UNZ_OK) break;
     name.resize(std::min<std::size_t>(about.size_filename, name.size()));
+    name.shrink_to_fit();
     all.push_back(std::move(name));
   }
   return all;
+}
+
+std::string ArchiveReader::fault_of_names() {
+  const std::vector<std::string> all = names();
+  if (all.size() > kMostEntries) return fmt::format("it has more than {} entries", kMostEntries);
+  std::set<std::string> seen;
+  for (const std::string& name : all) {
+    const bool is_plain =
+        std::ranges::none_of(name, [](unsigned char c) { return c < 0x20 || c == 0x7F || c == '\\'; });
+    const auto climbs = [](const std::filesystem::path& part) { return part == ".." || part == "/"; };
+    const std::filesystem::path path{name};
+    if (!is_plain || name.empty() || path.is_absolute() || std::ranges::any_of(path, climbs)) {
+      return fmt::format("it has an entry '{}', which is no plain path in it", name);
+    }
+    if (!seen.insert(name).second) return fmt::format("it has two entries '{}'", name);
+  }
+  return {};
 }
 
 Result<std::string> ArchiveReader::read(const std::string& name,
@@ -47,13 +68,21 @@ Result<std::string> ArchiveReader::read(const std::string& name,
     return server::fail(ErrorCode::invalid, fmt::format("{} is not in the archive", name), "missing");
   }
   if (unzOpenCurrentFile(zip_) != UNZ_OK) return damaged(name);
+  const std::uint64_t most = std::max(kAlwaysAllowed, kMostTimes * std::filesystem::file_size(path_));
   PieceHash hash;
   std::string piece(kArchivePieceBytes, '\0');
   int got = 0;
-  while ((got = unzReadCurrentFile(zip_, piece.data(), static_cast<unsigned>(piece.size()))) > 0) {
+  while (unpacked_ <= most && (got = unzReadCurrentFile(zip_, piece.data(), static_cast<unsigned>(piece.size()))) > 0) {
     const std::string part = piece.substr(0, static_cast<std::size_t>(got));
     hash.add(part.data(), part.size());
     take(part);
+    unpacked_ += part.size();
+  }
+  if (unpacked_ > most) {
+    unzCloseCurrentFile(zip_);
+    return server::fail(
+        ErrorCode::invalid,
+        fmt::format("what is packed, up to {}, is longer than {} bytes, {} times the archive", name, most, kMostTimes));
   }
   const int closed = unzCloseCurrentFile(zip_);
   if (got < 0 || closed != UNZ_OK) return damaged(name);

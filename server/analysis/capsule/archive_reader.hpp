@@ -1,6 +1,7 @@
 // Reads a zip archive: its entries one by one, each hashed, and the seal of archive_writer.hpp.
 //
-// Nothing is written to a path that the archive names. Errors: what is damaged is in the result of the call; throws
+// The archive may be anybody's: nothing is written to a path that it names, no two entries may have one name, and no
+// entry may be longer than kMostTimes the file. Errors: what is damaged is in the result of the call; throws
 // std::runtime_error for a file that is no zip archive.
 #pragma once
 
@@ -16,6 +17,10 @@ namespace server::analysis {
 
 enum class Seal : std::uint8_t { whole, broken, none };
 
+inline constexpr std::uint64_t kMostTimes = 100;          // what is packed may be longer than its archive
+inline constexpr std::size_t kMostEntries = 1000;         // of one
+inline constexpr std::uint64_t kAlwaysAllowed = 1 << 28;  // bytes
+
 class ArchiveReader {
  public:
   explicit ArchiveReader(std::filesystem::path path);
@@ -24,6 +29,8 @@ class ArchiveReader {
   ArchiveReader& operator=(const ArchiveReader&) = delete;
 
   std::vector<std::string> names();  // in the order of its directory; fewer if that is damaged
+  // Of the names: too many, one twice, one that climbs or is no plain path; empty: nothing.
+  std::string fault_of_names();
 
   // The entry in pieces to `take`; then its SHA-256. invalid: it is not there, or damaged.
   Result<std::string> read(const std::string& name, const std::function<void(const std::string& piece)>& take);
@@ -35,6 +42,7 @@ class ArchiveReader {
  private:
   std::filesystem::path path_;
   void* zip_ = nullptr;  // of minizip
+  std::uint64_t unpacked_ = 0;
 };
 
 }  // namespace server::analysis

@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include "server/runtime/exceptions.hpp"
+#include "server/storage/database/foreign_file.hpp"
 #include "server/storage/export/run_file.hpp"
 #include "server/storage/query/run_reader.hpp"
 
@@ -14,6 +15,11 @@ namespace {
 Result<CapsuleSamples> read_all(SQLite::Database& database, std::size_t limit) {
   if (database.execAndGet("PRAGMA application_id").getInt64() != storage::kRunFileApplicationId) {
     return fail(ErrorCode::invalid, "samples.sqlite is not the export of a run");
+  }
+  for (const char* table : {"sample", "outside_reference", "outside_position"}) {
+    if (database.tableExists(table) && !storage::is_plain_table(database, table)) {
+      return fail(ErrorCode::invalid, fmt::format("cannot read samples.sqlite: {} is no plain table", table));
+    }
   }
   auto samples = storage::read_exported_run(database, limit);
   if (!samples) return std::unexpected{samples.error()};
@@ -25,6 +31,7 @@ Result<CapsuleSamples> read_all(SQLite::Database& database, std::size_t limit) {
 Result<CapsuleSamples> read_capsule_samples(const std::filesystem::path& file, std::size_t limit) {
   try {
     SQLite::Database database{storage::reading_uri(file, true), SQLite::OPEN_READONLY | SQLite::OPEN_URI};
+    storage::guard_foreign(database);
     return read_all(database, limit);
   } catch (const SQLite::Exception& error) {
     return fail(ErrorCode::invalid, fmt::format("cannot read samples.sqlite: {}", runtime::text_of(error)));

@@ -15,6 +15,7 @@
 #include <utility>
 
 #include "base/json_text.hpp"
+#include "base/nesting.hpp"
 #include "server/analysis/capsule/capsule_samples.hpp"
 #include "server/analysis/capsule/crate_metadata.hpp"
 #include "server/analysis/metrics/metrics_json.hpp"
@@ -27,6 +28,7 @@ using nlohmann::json;
 
 constexpr std::size_t kMostCrateBytes = 16'000'000, kMostDocumentBytes = 64'000'000;
 constexpr std::size_t kMostSamples = 10'000'000;
+constexpr std::size_t kMostFaults = 100;
 constexpr const char* kSamplesFile = "samples.sqlite";
 constexpr const char* kMetricsFile = "metrics.json";
 constexpr const char* kRunFile = "run.json";
@@ -41,13 +43,19 @@ struct Crate {
   Result<std::string> text(const char* name) const { return archive.text(folder + name, kMostDocumentBytes); }
 };
 
+// Discarded: it is no JSON, or nested so deep that nobody meant it.
+json parse_foreign(const std::string& text) {
+  if (base::is_json_deeper(text, base::kMostJsonDepth)) return json::value_t::discarded;
+  return json::parse(text, nullptr, false);
+}
+
 Result<Crate> open_crate(ArchiveReader& archive) {
   for (const std::string& name : archive.names()) {
     const std::size_t slash = name.find('/');
     if (slash == std::string::npos || name.substr(slash + 1) != kCrateFile) continue;
     const auto text = archive.text(name, kMostCrateBytes);
     if (!text) return std::unexpected{text.error()};
-    const json document = json::parse(*text, nullptr, false);
+    const json document = parse_foreign(*text);
     if (!document.is_object() || !document.contains("@graph") || !document.at("@graph").is_array()) {
       return fail(ErrorCode::invalid, fmt::format("{} is not RO-Crate metadata", name));
     }
@@ -82,8 +90,13 @@ void check_files(Crate& crate, const std::filesystem::path& scratch, Reproductio
   std::set<std::string> described{crate.folder + kCrateFile};
   for (const json& entity : crate.graph) {
     if (member_of(entity, "@type") != "File") continue;
-    described.insert(crate.folder + member_of(entity, "@id"));
+    const std::string name = crate.folder + member_of(entity, "@id");
+    if (!described.insert(name).second) {  // each is unpacked once
+      found.faults.push_back(fmt::format("{} is in the crate's metadata twice", name));
+      return;
+    }
     check_file(crate, entity, scratch, found);
+    if (found.faults.size() > kMostFaults) return;
   }
   for (const std::string& name : crate.archive.names()) {
     if (!described.contains(name)) found.faults.push_back(fmt::format("{} is not in the crate's metadata", name));
@@ -121,7 +134,8 @@ void compare_metrics(json stored, const json& recomputed, std::vector<Reproduced
   for (const std::string& place : places) {
     const json was = before.contains(place) ? before.at(place) : json("-");
     const json is = now.contains(place) ? now.at(place) : json("-");
-    results.push_back({place.substr(1), agreement_of_values(was, is), base::dump(was), base::dump(is)});
+    results.push_back({place.empty() ? "the document" : place.substr(1), agreement_of_values(was, is), base::dump(was),
+                       base::dump(is)});
   }
 }
 
@@ -129,14 +143,16 @@ void compare_metrics(json stored, const json& recomputed, std::vector<Reproduced
 std::map<std::string, std::string> plots_in(const std::string& html) {
   constexpr std::string_view kTitle = "class=\"title\">";
   std::map<std::string, std::string> plots;
-  for (std::size_t from = html.find("<svg"); from != std::string::npos; from = html.find("<svg", from + 1)) {
-    const std::size_t to = html.find("</svg>", from);
+  const std::string_view text = html;
+  for (std::size_t from = text.find("<svg"); from != std::string::npos; from = text.find("<svg", from)) {
+    const std::size_t to = text.find("</svg>", from);
     if (to == std::string::npos) break;
-    const std::string plot = html.substr(from, to - from);
+    const std::string_view plot = text.substr(from, to - from);
+    from = to;
     const std::size_t title = plot.find(kTitle);
     if (title == std::string::npos) continue;
     const std::size_t words = title + kTitle.size();
-    plots[plot.substr(words, plot.find('<', words) - words)] = plot;
+    plots[std::string{plot.substr(words, plot.find('<', words) - words)}] = plot;
   }
   return plots;
 }
@@ -155,7 +171,7 @@ void compare_plots(const std::string& stored, const std::string& recomputed, std
 Result<json> document_in(const Crate& crate, const char* name) {
   const auto text = crate.text(name);
   if (!text) return std::unexpected{text.error()};
-  json document = json::parse(*text, nullptr, false);
+  json document = parse_foreign(*text);
   if (document.is_object()) return document;
   return fail(ErrorCode::invalid, fmt::format("{} is not a JSON object", name));
 }
@@ -168,6 +184,14 @@ storage::Run counted_run(const json& document) {
   const json missed = document.value("missed_ticks", json{}), longest = document.value("longest_missed_ticks", json{});
   if (missed.is_number_unsigned() && longest.is_number_unsigned()) {
     run.missed = storage::MissedTicks{missed.get<std::uint64_t>(), longest.get<std::uint64_t>()};
+  }
+  for (const json& part : document.value("interrupted", json::array())) {  // none of version 0.9.0
+    const auto number = [&part](const char* name) {
+      const json value = part.is_object() ? part.value(name, json{}) : json{};
+      return value.is_number_unsigned() ? value.get<std::uint64_t>() : 0;
+    };
+    run.interrupted.push_back({static_cast<std::uint32_t>(number("span")), number("from_robot_time_us"),
+                               number("to_robot_time_us"), member_of(part, "reason"), member_of(part, "detail")});
   }
   return run;
 }
@@ -192,6 +216,7 @@ Result<void> recompute(const Crate& crate, const std::filesystem::path& scratch,
   if (!samples) return std::unexpected{samples.error()};
   RunReport report;
   const storage::Run counted = counted_run(*run);
+  report.run.interrupted = counted.interrupted;
   report.metrics = json::parse(base::dump(json_of(metrics_of(*samples, counted))));
   const bool has_missed = metrics->contains(json::json_pointer{"/figures/missed_ticks"});  // not of version 0.9.0
   if (has_missed) add_missed_ticks(report.metrics, counted);
@@ -212,7 +237,11 @@ Token next_token(std::string_view& text) {
   for (std::size_t at = 0; at < text.size(); ++at) {
     double number = 0;
     const auto [end, error] = std::from_chars(text.data() + at, text.data() + text.size(), number);
-    if (error != std::errc{}) continue;
+    if (error == std::errc::invalid_argument) continue;
+    if (error != std::errc{}) {  // beyond every double: words, as a whole
+      at = static_cast<std::size_t>(end - text.data()) - 1;
+      continue;
+    }
     const Token token{text.substr(0, at), number};
     text.remove_prefix(static_cast<std::size_t>(end - text.data()));
     return token;
@@ -250,6 +279,10 @@ bool Reproduction::is_reproduced() const {
 Result<Reproduction> reproduce(const std::filesystem::path& archive, const std::filesystem::path& scratch) {
   ArchiveReader reader{archive};
   Reproduction found;
+  if (std::string fault = reader.fault_of_names(); !fault.empty()) {
+    found.faults.push_back(std::move(fault));
+    return found;
+  }
   auto crate = open_crate(reader);
   if (!crate) {
     if (crate.error().reason != "damaged") return std::unexpected{crate.error()};

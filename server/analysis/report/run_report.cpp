@@ -7,6 +7,7 @@
 #include <cmath>
 #include <iterator>
 #include <limits>
+#include <optional>
 
 #include "server/analysis/report/page.hpp"
 #include "server/analysis/report/svg_plot.hpp"
@@ -129,6 +130,46 @@ Plot plot_of(const RunReport& report, const std::vector<double>& times_s, const 
   return plot;
 }
 
+// On the time axis of the plots.
+std::vector<PlotStretch> interrupted_stretches(const RunReport& report, const std::vector<double>& times_s) {
+  std::vector<PlotStretch> stretches;
+  for (const storage::InterruptedPart& part : report.run.interrupted) {
+    std::optional<std::size_t> first, last;
+    for (std::size_t i = 0; i < report.trace.size(); ++i) {
+      const TracePoint& point = report.trace[i];
+      if (point.span != part.span || point.robot_time_us < part.from_robot_us) continue;
+      if (point.robot_time_us >= part.to_robot_us) break;
+      if (!first) first = i;
+      last = i;
+    }
+    if (first) stretches.push_back({times_s[*first], times_s[*last]});
+  }
+  return stretches;
+}
+
+std::string interruptions(const RunReport& report) {
+  if (report.run.interrupted.empty()) return {};
+  std::string out =
+      "<h2>Interruptions</h2>\n<p>The experiment waited here with the robot at rest; then a duty went on where it was "
+      "broken off, closed-loop steps began again, or it ended. This is recorded; a fit leaves it out.</p>\n"
+      "<table><tr><th class=\"number\">at (s)</th><th class=\"number\">for (s)</th><th>Why</th><th>In "
+      "words</th></tr>\n";
+  const std::vector<double> times_s = times_of(report.trace);
+  for (const storage::InterruptedPart& part : report.run.interrupted) {
+    const auto is_from = [&part](const TracePoint& point) {
+      return point.span == part.span && point.robot_time_us >= part.from_robot_us;
+    };
+    const auto first = std::ranges::find_if(report.trace, is_from);
+    const double length_s = static_cast<double>(part.to_robot_us - part.from_robot_us) / 1e6;
+    out += fmt::format("<tr><td class=\"number\">{}</td><td class=\"number\">{:.2f}</td><td>{}</td><td>{}</td></tr>\n",
+                       first == report.trace.end()
+                           ? "-"
+                           : fmt::format("{:.2f}", times_s[static_cast<std::size_t>(first - report.trace.begin())]),
+                       length_s, html_escaped(part.reason), html_escaped(part.detail));
+  }
+  return out + "</table>\n";
+}
+
 std::string plots(const RunReport& report) {
   std::string out = "<h2>Record</h2>\n";
   if (report.trace.empty()) return out + "<p>No sample of this run is stored.</p>\n";
@@ -139,7 +180,10 @@ std::string plots(const RunReport& report) {
       plot_of(report, times_s, "Duty", "commanded", kCommanded, [](const TracePoint& point) { return point.duty; }));
   all.push_back(plot_of(report, times_s, "Impedance (mV)", "measured", kMeasured,
                         [](const TracePoint& point) { return point.impedance_mv; }));
+  const std::vector<PlotStretch> interrupted = interrupted_stretches(report, times_s);
   for (Plot& plot : all) {
+    plot.stretches = interrupted;
+    plot.stretch_label = "interrupted";
     plot.x_to = times_s.back();
     out += svg_of(plot);
   }
@@ -198,8 +242,8 @@ std::string origin(const RunReport& report) {
 }  // namespace
 
 std::string html_of(const RunReport& report) {
-  return heading(report) + conditions(report.run) + plots(report) + steps(report.metrics) + figures(report.metrics) +
-         origin(report) + page_end();
+  return heading(report) + conditions(report.run) + plots(report) + interruptions(report) + steps(report.metrics) +
+         figures(report.metrics) + origin(report) + page_end();
 }
 
 }  // namespace server::analysis

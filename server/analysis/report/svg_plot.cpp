@@ -15,6 +15,7 @@ constexpr double kWidth_px = 760, kLeft_px = 62, kRight_px = 12, kTop_px = 26, k
 constexpr double kPlotWidth_px = kWidth_px - kLeft_px - kRight_px;
 constexpr int kTimeTicks = 8, kValueTicks = 4;
 constexpr double kMargin = 0.06;  // of the range, above and below
+constexpr const char* kStretchStyle = "fill:currentColor;fill-opacity:0.1";
 
 // From values to pixels.
 struct Scale {
@@ -160,6 +161,16 @@ std::string band_of(const PlotBand& band, const Scale& x, const Scale& y) {
   return out;
 }
 
+std::string stretches_of(const Plot& plot, const Scale& x, const Scale& y) {
+  std::string out;
+  for (const PlotStretch& stretch : plot.stretches) {
+    const double from_px = x(std::clamp(stretch.from, x.from, x.to)), to_px = x(std::clamp(stretch.to, x.from, x.to));
+    out += fmt::format("<rect x=\"{:.1f}\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"{:.1f}\" style=\"{}\"/>", from_px,
+                       y.end_px, to_px - from_px, y.begin_px - y.end_px, kStretchStyle);
+  }
+  return out;
+}
+
 // As many decimals as the distance of the ticks needs.
 std::string tick_text(double value, double step) {
   const int decimals = std::clamp(static_cast<int>(-std::floor(std::log10(step))), 0, 9);
@@ -201,6 +212,10 @@ struct LegendEntry {
 
 std::vector<LegendEntry> legend_entries(const Plot& plot) {
   std::vector<LegendEntry> entries;
+  if (!plot.stretches.empty()) {
+    entries.push_back(
+        {plot.stretch_label, fmt::format("<rect y=\"-5\" width=\"18\" height=\"10\" style=\"{}\"/>", kStretchStyle)});
+  }
   for (const PlotBand& band : plot.bands) {
     if (band.label.empty()) continue;
     entries.push_back({band.label, fmt::format("<rect y=\"-5\" width=\"18\" height=\"10\" style=\"fill:{}\" "
@@ -294,6 +309,7 @@ std::string svg_of(const Plot& plot) {
     out += fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"middle\">{}</text>", kLeft_px + kPlotWidth_px / 2,
                        bottom_px + kBottom_px + 8, html_escaped(plot.x_title));
   }
+  out += stretches_of(plot, x, y);
   for (const PlotBand& band : plot.bands) out += band_of(band, x, y);
   for (const PlotLine& line : plot.lines) out += line_of(line, x, y);
   return out + "</svg>\n";

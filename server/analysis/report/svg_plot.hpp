@@ -24,10 +24,17 @@ struct PlotBand {
   std::vector<double> x, low, high;
 };
 
+// Shaded over the whole height.
+struct PlotStretch {
+  double from = 0, to = 0;
+};
+
 struct Plot {
   std::string title;  // with unit
   std::vector<PlotLine> lines;
   std::vector<PlotBand> bands;
+  std::vector<PlotStretch> stretches;
+  std::string stretch_label;
   double x_from = 0, x_to = 1;  // of the axis
   std::string x_title;          // below it, with unit; may be empty
   int height_px = 190;          // of what is drawn; a legend that needs more rows, and x_title, come on top

@@ -47,13 +47,21 @@ void add_controller(const MeasuredTuneRequest& request, const control::MeasuredT
 }
 
 Result<std::string> compute(const RunSamples& samples, const MeasuredTuneRequest& request, storage::JobRun& run) {
-  const auto recorded = recording_of(samples.samples, request.window, nullptr, ChannelChoice::robot);
+  const auto recorded = recording_of(samples, request.window, ChannelChoice::robot);
   if (!recorded) return std::unexpected{recorded.error()};
   const control::Recording& recording = recorded->recording;
   if (recording.acceleration_m_s2.empty()) {
     return fail(ErrorCode::invalid,
                 fmt::format("the position of run {} was measured: find a model with the job identify", request.run),
                 "no_acceleration");
+  }
+  if (!recording.is_left_out.empty()) {
+    return fail(
+        ErrorCode::invalid,
+        fmt::format("run {} was interrupted, and tones are measured in one piece: repeat the run, or choose a part "
+                    "of it without an interruption. {}",
+                    request.run, recorded->warnings.front()),
+        "interrupted");
   }
   run.report(0.3, "measuring the tones");
   const control::ToneRecord record{recording.duty, recording.acceleration_m_s2, recording.dt_s, kBeginning_s};

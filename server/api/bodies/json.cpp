@@ -12,6 +12,8 @@
 #include <string>
 #include <vector>
 
+#include "base/nesting.hpp"
+
 namespace server::api {
 
 using nlohmann::json;
@@ -52,22 +54,6 @@ std::optional<std::int64_t> integer_of(const json& value) {
   return value.get<std::int64_t>();
 }
 
-// Outside of texts. What is nested deeper would be written and destroyed by recursion as deep.
-bool is_nested_too_deep(const std::string& text) {
-  int depth = 0;
-  bool in_text = false;
-  for (std::size_t i = 0; i < text.size(); ++i) {
-    const char c = text[i];
-    if (c == '"') in_text = !in_text;
-    if (in_text && c == '\\') ++i;
-    if (in_text) continue;
-    if (c == '[' || c == '{') ++depth;
-    if (c == ']' || c == '}') --depth;
-    if (depth > kMaxJsonDepth) return true;
-  }
-  return false;
-}
-
 // Of each object the name of a member that comes twice: nlohmann's parser keeps the last one and forgets the others.
 class RepeatedMembers {
  public:
@@ -89,7 +75,7 @@ class RepeatedMembers {
 }  // namespace
 
 Result<Members> Members::parse(const std::string& text, std::initializer_list<const char*> known) {
-  if (is_nested_too_deep(text)) {
+  if (base::is_json_deeper(text, kMaxJsonDepth)) {
     return fail(ErrorCode::bad_request, fmt::format("the body is nested deeper than {} levels", kMaxJsonDepth),
                 "malformed_json");
   }
@@ -247,6 +233,14 @@ json to_json(const storage::Run& run) {
   out["samples_lost"] = run.samples_lost;
   out["missed_ticks"] = run.missed ? json(run.missed->count) : json(nullptr);
   out["longest_missed_ticks"] = run.missed ? json(run.missed->longest) : json(nullptr);
+  out["interrupted"] = json::array();
+  for (const storage::InterruptedPart& part : run.interrupted) {
+    out["interrupted"].push_back({{"span", part.span},
+                                  {"from_robot_time_us", part.from_robot_us},
+                                  {"to_robot_time_us", part.to_robot_us},
+                                  {"reason", part.reason},
+                                  {"detail", part.detail}});
+  }
   return out;
 }
 

@@ -29,8 +29,13 @@ json run_json(const storage::ExperimentRun& run) {
 }
 
 json progress_json(const experiments::ExperimentProgress& progress) {
-  return {{"run", progress.run},     {"runs", progress.runs},           {"step", progress.step},
-          {"steps", progress.steps}, {"elapsed_s", progress.elapsed_s}, {"duration_s", progress.duration_s}};
+  return {{"run", progress.run},
+          {"runs", progress.runs},
+          {"step", progress.step},
+          {"steps", progress.steps},
+          {"elapsed_s", progress.elapsed_s},
+          {"duration_s", progress.duration_s},
+          {"goes_on_in_s", progress.goes_on_in_s ? json(*progress.goes_on_in_s) : json(nullptr)}};
 }
 
 // The document of a profile as it is kept.

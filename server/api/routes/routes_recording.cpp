@@ -71,6 +71,7 @@ http::Answer get_recording(RecordingRoutes parts, http::Request) {
             {"wal_bytes", wal.bytes},
             {"wal_held_s", wal.held_since_us == 0 ? 0 : static_cast<double>(held_us) / 1e6},
             {"losses", losses_json(recording.head_watch.losses())},
+            {"clock_is_doubted", recording.removal_clock.is_doubted()},
             {"counters", to_json(recording.recorder.counters())},
             {"retention", to_json(recording.retention)}});
 }
@@ -79,6 +80,18 @@ http::Answer acknowledge_losses(RecordingRoutes parts, http::Request request) {
   const station::Author by = author_of(request, parts.clock);
   const auto done = co_await parts.recording.head_watch.acknowledge(by);
   if (!done) co_return http::problem(done.error());
+  co_return http::json_response(200, json::object());
+}
+
+http::Answer accept_clock(RecordingRoutes parts, http::Request request) {
+  if (!parts.recording.removal_clock.is_doubted()) {
+    co_return http::problem(409, "nothing is doubted of the clock", "conflict");
+  }
+  parts.recording.removal_clock.accept();
+  station::AuditNote note;
+  note.by = author_of(request, parts.clock);
+  note.action = "station.clock_accepted";
+  parts.recording.recorder.on_audit(note);
   co_return http::json_response(200, json::object());
 }
 
@@ -122,6 +135,7 @@ void add_recording_routes(http::Router& router, RecordingRoutes parts) {
   add("GET", "/metrics", identity::Scope::read, get_metrics);
   add("GET", "/api/v1/recording", identity::Scope::read, get_recording);
   add("POST", "/api/v1/recording/losses/acknowledge", identity::Scope::admin, acknowledge_losses);
+  add("POST", "/api/v1/recording/clock/accept", identity::Scope::admin, accept_clock);
   add("GET", "/api/v1/backups", identity::Scope::read, list_backups);
   add("POST", "/api/v1/backups", identity::Scope::admin, create_backup);
 }

@@ -60,14 +60,14 @@ const char* words_of(analysis::Seal seal) {
 }
 
 void write_text(std::ostream& out, const Reproduction& found) {
-  for (const std::string& fault : found.faults) fmt::print(out, "{}\n", fault);
+  for (const std::string& fault : found.faults) fmt::print(out, "{}\n", one_line(fault));
   if (!found.faults.empty()) return;
   fmt::print(out, "{} files have the SHA-256 that the crate says; {}\n", found.files, words_of(found.seal));
-  fmt::print(out, "made by Rheonaut {} on {}, computed again by Rheonaut {} on {}\n\n", found.program,
-             found.architecture, base::version(), analysis::architecture());
+  fmt::print(out, "made by Rheonaut {} on {}, computed again by Rheonaut {} on {}\n\n", one_line(found.program),
+             one_line(found.architecture), base::version(), analysis::architecture());
   Table table{{"<what", "in the archive", "computed again", "<equal"}};
   for (const analysis::Reproduced& result : found.results) {
-    table.row({result.name, result.stored, result.recomputed, text(result.agreement)});
+    table.row({one_line(result.name), one_line(result.stored), one_line(result.recomputed), text(result.agreement)});
   }
   table.write(out);
   fmt::print(out, "\nof {}: {} equal bit for bit, {} within 1e-9, {} different\n", found.results.size(),
@@ -91,7 +91,7 @@ void write_json(std::ostream& out, const Reproduction& found) {
                                  {"computed", result.recomputed},
                                  {"equal", text(result.agreement)}});
   }
-  fmt::print(out, "{}\n", answer.dump(2));
+  fmt::print(out, "{}\n", answer.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
 }
 
 }  // namespace
@@ -109,7 +109,7 @@ int run(const Reproduce& options, std::ostream& out) {
   const Progress progress{"reproduce", options.form};
   const auto found = analysis::reproduce(options.file, scratch.path());
   if (!found) {
-    fmt::print(stderr, "rheonaut: {}: {}\n", options.file.string(), found.error().detail);
+    fmt::print(stderr, "rheonaut: {}: {}\n", options.file.string(), one_line(found.error().detail));
     return kNotAnArchive;
   }
   if (options.form.is_json) {

@@ -15,6 +15,7 @@
 #include <utility>
 
 #include "base/json_text.hpp"
+#include "base/nesting.hpp"
 #include "control/search/missed_ticks.hpp"
 #include "server/analysis/control_json.hpp"
 #include "server/analysis/motion_at_start.hpp"
@@ -45,8 +46,12 @@ std::string read_text(const std::string& file, std::size_t max_bytes) {
 }
 
 nlohmann::json read_json(const std::string& file) {
+  const std::string text = read_text(file, kMaxJsonBytes);
+  if (base::is_json_deeper(text, base::kMostJsonDepth)) {
+    refuse(file, fmt::format("has lists and objects in each other, more than {} deep", base::kMostJsonDepth));
+  }
   try {
-    return nlohmann::json::parse(read_text(file, kMaxJsonBytes));
+    return nlohmann::json::parse(text);
   } catch (const nlohmann::json::exception& error) {
     refuse(file, "is not JSON: " + base::fault_of(error));
   }

@@ -133,9 +133,7 @@ analysis::RunOfMany run_for(const Identify& options, std::size_t index) {
   analysis::RunWindow window{value_for(options.spans, index), value_for(options.from_s, index).value_or(0),
                              value_for(options.to_s, index).value_or(std::numeric_limits<double>::infinity()),
                              options.with_velocity, options.cuts_at_gaps};
-  const std::vector<storage::StoredSample> samples = read_samples(choice);
-  const std::optional<storage::StoredReference> reference = read_reference(choice);
-  auto recording = recording_of(samples, window, reference ? &*reference : nullptr, options.channels);
+  auto recording = recording_of(read_run_samples(choice), window, options.channels);
   if (!recording) throw std::runtime_error{fmt::format("run {}: {}", *choice.run, recording.error().detail)};
   return {*choice.run, std::move(*recording)};
 }

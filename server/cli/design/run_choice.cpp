@@ -50,6 +50,13 @@ std::optional<storage::StoredReference> read_reference(const RunChoice& choice) 
   return read_from(choice, read);
 }
 
+analysis::RunSamples read_run_samples(const RunChoice& choice) {
+  const auto read = [&](SQLite::Database& database) {
+    return storage::read_interrupted_parts(database, choice.run.value());
+  };
+  return {read_samples(choice), read_reference(choice), read_from(choice, read)};
+}
+
 std::optional<std::uint32_t> read_controller_checksum(const RunChoice& choice) {
   const auto snapshot = read_from(
       choice, [&](SQLite::Database& database) { return storage::read_snapshot(database, choice.run.value()); });

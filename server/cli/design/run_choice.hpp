@@ -24,6 +24,7 @@ void add_options(CLI::App& command, RunChoice& choice);
 // Throws std::runtime_error saying what is wrong; never creates or changes anything.
 std::vector<storage::StoredSample> read_samples(const RunChoice& choice);
 std::optional<storage::StoredReference> read_reference(const RunChoice& choice);  // none: the run has none
+analysis::RunSamples read_run_samples(const RunChoice& choice);                   // with both
 // Of the controller that the robot had when the run began; none: not known.
 std::optional<std::uint32_t> read_controller_checksum(const RunChoice& choice);
 

@@ -19,6 +19,7 @@
 #include "server/cli/accounts/account_access.hpp"
 #include "server/cli/accounts/station_client.hpp"
 #include "server/cli/experiments/profile_file.hpp"
+#include "server/cli/terminal/keys.hpp"
 #include "server/cli/terminal/options.hpp"
 #include "server/cli/terminal/output.hpp"
 
@@ -77,8 +78,8 @@ bool is_over(const json& experiment) { return !experiment.at("ended_at_us").is_n
 // Shows each change of the line once, or all the time on a terminal.
 class ProgressShown {
  public:
-  void show(const json& experiment) {
-    const std::string line = progress_line(experiment);
+  void show(const json& experiment, const char* hint) {
+    const std::string line = progress_line(experiment) + hint;
     if (line == last_) return;
     if (is_terminal_) {
       fmt::print(stderr, "\r\x1b[K{}", line);
@@ -124,6 +125,12 @@ class Interrupt {
   bool has_come_ = false;
 };
 
+// In the count-down after an interruption.
+bool goes_on_by_itself(const json& experiment) {
+  const json& progress = experiment.at("progress");
+  return progress.is_object() && progress.value("goes_on_in_s", json()).is_number();
+}
+
 // The signs of life of this invocation do not count: somebody else's do.
 void say_whose(const StationAnswer& refused) {
   if (refused.body.value("reason", "") != "acts_for_another") return;
@@ -133,8 +140,9 @@ void say_whose(const StationAnswer& refused) {
 json watch(const StationClient& station, std::int64_t id) {
   ProgressShown progress;
   Interrupt interrupt;
+  const Keys keys{::isatty(STDERR_FILENO) != 0};  // where the count-down is shown
   const std::string one = fmt::format("{}/{}", kExperiments, id);
-  bool is_interrupted = false, was_told = false;
+  bool is_interrupted = false, was_told = false, is_shown = false;
   json seen = json::object();  // SAFETY: a sign of life is as old as what this tool has seen of the station
   for (;;) {
     // A sign of life, answered without the runs. Refused when it has ended, or when somebody has taken it over: then it
@@ -144,11 +152,15 @@ json watch(const StationClient& station, std::int64_t id) {
     if (kept.status == kConflict && !std::exchange(was_told, true)) say_whose(kept);
     if (is_ours) seen["stamp_us"] = kept.body.at("stamp_us");
     json experiment = is_ours ? kept.body : ask_experiments(station, "GET", one);
-    progress.show(experiment);
+    const bool may_be_paused = is_ours && goes_on_by_itself(experiment);
+    progress.show(experiment, may_be_paused && keys.are_read() ? " (any key pauses it)" : "");
     if (is_over(experiment)) {
       progress.end();
       return is_ours ? ask_experiments(station, "GET", one) : experiment;  // with its runs
     }
+    // SAFETY: who presses a key while the robot is about to move again decides that it does not.
+    const bool is_pressed = keys.pressed().has_value(), was_shown = std::exchange(is_shown, may_be_paused);
+    if (is_pressed && was_shown && may_be_paused) station.ask("POST", one + "/pause", json::object());
     if (!interrupt.comes_within_ms(kWatch_ms)) continue;
     if (is_interrupted || !is_ours) throw std::runtime_error{"interrupted; the experiment is still there"};
     is_interrupted = true;

@@ -13,6 +13,7 @@
 #include "server/cli/health/store_checks.hpp"
 #include "server/cli/terminal/exit_status.hpp"
 #include "server/cli/terminal/options.hpp"
+#include "server/config/file_system.hpp"
 #include "server/runtime/exceptions.hpp"
 
 namespace server::cli {
@@ -49,13 +50,14 @@ Findings examine(const config::ConfigFlags& flags) {
   check_station(running, config.data_dir, findings);
   check_ports(running, config, findings);
   judge_disk(measure_disk(config.data_dir), config, findings);
+  judge_file_system(config::unsuitable_file_system(config.data_dir), config, findings);
   clock.recorded_us = check_database(config.database(), findings);
   judge_clock(clock, findings);
   check_robots(config.database(), running, clock.now_us, findings);
   check_permissions(config, findings);
   check_certificate(config, clock.now_us, findings);
   check_real_time(running, config, findings);
-  check_open_files(running, config, findings);
+  check_limits(running, config, findings);
   return findings;
 }
 

@@ -12,9 +12,8 @@
 #include <array>
 #include <boost/asio/io_context.hpp>
 #include <cmath>
-#include <fstream>
-#include <sstream>
 
+#include "server/config/file_system.hpp"
 #include "server/runtime/tasks.hpp"
 #include "server/storage/upkeep/disk_watch.hpp"
 
@@ -25,7 +24,6 @@ constexpr double kSlowSyncMs = 100, kTooSlowSyncMs = 1000;  // a commit each 100
 constexpr double kMostStepMs = 20;
 constexpr microseconds kClockWatch{std::chrono::milliseconds{250}};
 constexpr std::int64_t kMostFutureUs = 60'000'000;
-constexpr std::uint64_t kOtherFiles = 200;  // database, logs, exports
 constexpr double kUsPerS = 1e6;
 
 double elapsed_ms(std::int64_t from_us, std::int64_t to_us) { return static_cast<double>(to_us - from_us) / 1e3; }
@@ -51,24 +49,6 @@ std::optional<double> measure_sync_ms(const std::filesystem::path& folder) {
   ::close(file);
   std::ranges::sort(times);
   return times[times.size() / 2];
-}
-
-std::uint64_t own_open_files() {
-  rlimit limit{};
-  getrlimit(RLIMIT_NOFILE, &limit);
-  return limit.rlim_max;
-}
-
-// The hard limit, up to which the station raises its own; a line "Max open files  1024  524288  files".
-std::optional<std::uint64_t> open_files_of(int pid) {
-  std::ifstream in{fmt::format("/proc/{}/limits", pid)};
-  for (std::string line; std::getline(in, line);) {
-    if (!line.starts_with("Max open files")) continue;
-    std::istringstream words{line.substr(line.find("files") + 5)};
-    std::uint64_t soft = 0, hard = 0;
-    if (words >> soft >> hard) return hard;
-  }
-  return std::nullopt;
 }
 
 }  // namespace
@@ -166,23 +146,27 @@ void check_real_time(const RunningStation& running, const config::Config& config
   findings.note("real time", "this user may not ask for real-time priority", kPermit);
 }
 
-void check_open_files(const RunningStation& running, const config::Config& config, Findings& findings) {
-  std::optional<std::uint64_t> allowed;
-  if (running.is_running && running.pid > 0) allowed = open_files_of(running.pid);
-  judge_open_files(allowed.value_or(own_open_files()), config, findings);
+void check_limits(const RunningStation& running, const config::Config& config, Findings& findings) {
+  std::optional<config::ResourceLimits> limits;
+  if (running.is_running && running.pid > 0) limits = config::limits_of(running.pid);
+  judge_limits(limits.value_or(config::own_limits()), config, findings);
 }
 
-void judge_open_files(std::uint64_t allowed, const config::Config& config, Findings& findings) {
-  const std::uint64_t wanted = config.http_places.connections + config.robot_places.connections + kOtherFiles;
-  if (allowed >= wanted) {
-    return findings.fine("open files", fmt::format("{} are allowed, {} may be needed", allowed, wanted));
-  }
-  findings.problem("open files",
-                   fmt::format("{} are allowed, and {} may be needed: for {} pages and {} robots", allowed, wanted,
-                               config.http_places.connections, config.robot_places.connections),
-                   fmt::format("allow more (LimitNOFILE={} in the systemd unit, or ulimit -Hn), or lower "
-                               "robots.max_connections",
-                               wanted));
+void judge_limits(const config::ResourceLimits& limits, const config::Config& config, Findings& findings) {
+  const auto tight = tight_limits(limits, config);
+  for (const config::TightLimit& limit : tight) findings.problem("limits", limit.what, limit.action);
+  if (!tight.empty()) return;
+  findings.fine("limits",
+                fmt::format("files, memory and computing are not limited; {} open files are allowed, {} may be "
+                            "needed",
+                            limits.open_files ? fmt::format("{}", *limits.open_files) : "any number of",
+                            needed_open_files(config)));
+}
+
+void judge_file_system(const std::string& unsuitable, const config::Config& config, Findings& findings) {
+  if (unsuitable.empty()) return findings.fine("file system", "locks, links and syncs hold there, as far as is known");
+  findings.problem("file system", config::unsuitable_in_words(unsuitable, config.data_dir),
+                   "stop the station, copy the folder to a local disk, and name it with --data");
 }
 
 }  // namespace server::cli

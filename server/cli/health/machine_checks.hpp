@@ -1,4 +1,4 @@
-// What the doctor checks of the machine: disk, clock, real-time priority, open files.
+// What the doctor checks of the machine: disk, file system, clock, real-time priority, limits of the system.
 //
 // Each measurement is apart from its judgement, so that a test can judge what no test machine has. Times are in the
 // unit of their name. Errors: none; what cannot be measured is a note.
@@ -7,10 +7,12 @@
 #include <cstdint>
 #include <filesystem>
 #include <optional>
+#include <string>
 
 #include "server/cli/health/findings.hpp"
 #include "server/cli/health/running_station.hpp"
 #include "server/config/config.hpp"
+#include "server/config/resource_limits.hpp"
 
 namespace server::cli {
 
@@ -32,7 +34,8 @@ void judge_clock(const ClockFacts& facts, Findings& findings);
 
 // Of the station that runs, or of what this user would be allowed.
 void check_real_time(const RunningStation& running, const config::Config& config, Findings& findings);
-void check_open_files(const RunningStation& running, const config::Config& config, Findings& findings);
-void judge_open_files(std::uint64_t allowed, const config::Config& config, Findings& findings);
+void check_limits(const RunningStation& running, const config::Config& config, Findings& findings);
+void judge_limits(const config::ResourceLimits& limits, const config::Config& config, Findings& findings);
+void judge_file_system(const std::string& unsuitable, const config::Config& config, Findings& findings);
 
 }  // namespace server::cli

@@ -63,15 +63,17 @@ std::string without_hosts(std::string text) {
 
 // "password = hunter2", "Authorization: Bearer abc", "code=abc": the word after such a name.
 std::string without_named_values(std::string text) {
-  constexpr std::array<std::string_view, 13> kNames{"token",  "password", "passwd",  "secret",  "bearer",
-                                                    "cookie", "code=",    "apikey",  "api-key", "authorization",
-                                                    "psk",    "pwd",      "wifi key"};
+  constexpr std::array<std::string_view, 14> kNames{"token",  "password", "passwd",   "secret",  "bearer",
+                                                    "cookie", "code=",    "apikey",   "api-key", "authorization",
+                                                    "psk",    "pwd",      "wifi key", "ticket="};
   const std::string lower = lower_case(text);
   std::vector<std::pair<std::size_t, std::size_t>> found;  // begin and end of each value
   for (const std::string_view name : kNames) {
     for (auto at = lower.find(name); at != std::string::npos; at = lower.find(name, at + 1)) {
       std::size_t begin = at + name.size();
-      while (begin < text.size() && (is_letter(text[begin]) || std::string_view{"_-"}.contains(text[begin])))
+      const bool is_whole = name.ends_with('=');
+      while (!is_whole && begin < text.size() &&
+             (is_letter(text[begin]) || std::string_view{"_-"}.contains(text[begin])))
         ++begin;  // "tokens", "token_hash"
       while (begin < text.size() && std::string_view{" \t\"'=:\\"}.contains(text[begin])) ++begin;
       std::size_t end = begin;

@@ -3,9 +3,7 @@
 
 #include <fmt/format.h>
 #include <fmt/ostream.h>
-#include <poll.h>
 #include <sys/ioctl.h>
-#include <termios.h>
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
@@ -17,6 +15,7 @@
 #include <sstream>
 
 #include "server/cli/accounts/station_client.hpp"
+#include "server/cli/terminal/keys.hpp"
 #include "server/cli/terminal/options.hpp"
 #include "server/runtime/exceptions.hpp"
 
@@ -121,27 +120,18 @@ std::string json_lines(const json& robots, std::int64_t now_us) {
 // Another screen without a cursor and without echo; the person's own one comes back.
 class FullScreen {
  public:
-  explicit FullScreen(bool is_on) : is_on_{is_on} {
+  explicit FullScreen(bool is_on) : is_on_{is_on}, keys_{is_on} {
     if (!is_on_) return;
-    has_keys_ = tcgetattr(STDIN_FILENO, &before_) == 0;
-    termios silent = before_;
-    silent.c_lflag &= ~static_cast<tcflag_t>(ECHO | ICANON);
-    if (has_keys_) tcsetattr(STDIN_FILENO, TCSANOW, &silent);
     write("\x1b[?1049h\x1b[?25l");
   }
   ~FullScreen() {
     if (!is_on_) return;
     write("\x1b[?25h\x1b[?1049l");
-    if (has_keys_) tcsetattr(STDIN_FILENO, TCSANOW, &before_);
   }
   FullScreen(const FullScreen&) = delete;
   FullScreen& operator=(const FullScreen&) = delete;
 
-  bool is_q_pressed() const {
-    pollfd keys{STDIN_FILENO, POLLIN, 0};
-    char key = 0;
-    return has_keys_ && ::poll(&keys, 1, 0) == 1 && ::read(STDIN_FILENO, &key, 1) == 1 && key == 'q';
-  }
+  bool is_q_pressed() const { return keys_.pressed() == 'q'; }
 
  private:
   static void write(const char* text) {
@@ -150,8 +140,7 @@ class FullScreen {
   }
 
   bool is_on_;
-  bool has_keys_ = false;
-  termios before_{};
+  Keys keys_;
 };
 
 struct Size {

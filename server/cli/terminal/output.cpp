@@ -91,11 +91,17 @@ int not_done(int exit_status, std::string_view outcome) {
   return exit_status;
 }
 
+// Also the control characters of C1, two bytes of UTF-8, which terminals obey as they obey an escape.
 std::string one_line(std::string_view text) {
   std::string shown;
-  for (const char c : text) {
-    const auto byte = static_cast<unsigned char>(c);
-    shown += byte < 0x20 || byte == 0x7F ? fmt::format("\\x{:02X}", byte) : std::string{c};
+  for (std::size_t at = 0; at < text.size(); ++at) {
+    const auto byte = static_cast<unsigned char>(text[at]);
+    const auto next = at + 1 < text.size() ? static_cast<unsigned char>(text[at + 1]) : 0U;
+    const bool is_c1 = byte == 0xC2 && next >= 0x80 && next < 0xA0;
+    if (is_c1) ++at;
+    shown += is_c1                         ? fmt::format("\\x{:02X}", next)
+             : byte < 0x20 || byte == 0x7F ? fmt::format("\\x{:02X}", byte)
+                                           : std::string{text[at]};
   }
   return shown;
 }

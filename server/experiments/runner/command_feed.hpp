@@ -47,6 +47,7 @@ class CommandFeed {
   std::uint64_t tick_at(std::uint64_t robot_now_us) const;  // of the line
   std::size_t step_at(std::uint64_t robot_now_us) const;
   std::uint64_t robot_time_us(std::uint64_t tick) const;  // (1)
+  std::uint64_t begins_at_robot_us() const { return begins_at_robot_us_; }
 
  private:
   protocol::Command timed(std::uint64_t tick) const;

@@ -157,7 +157,7 @@ asio::awaitable<Result<storage::Run>> Conduct::create_run(const Variant& variant
 
 asio::awaitable<void> Conduct::begin_recording(const Variant& variant, const TimeLine& line) {
   auto run = co_await create_run(variant);
-  std::int64_t ends_us = parts_.driver.clock.steady_us() + kBackWithin.count();
+  std::int64_t ends_us = parts_.driver.clock.steady_us() + parts_.driver.back_within.count();
   while (!run && may_pass(run.error()) && !abort_) {
     activity_ = "waiting for the disk, to begin its run";
     co_await parts_.driver.clock.sleep_for(kDiskAgain);
@@ -165,7 +165,7 @@ asio::awaitable<void> Conduct::begin_recording(const Variant& variant, const Tim
       is_resumed_ = false;
       waiting_for_ = Abort{"not_recorded", run.error().detail};
       co_await await_resumption(kFluidWithin);
-      ends_us = parts_.driver.clock.steady_us() + kBackWithin.count();
+      ends_us = parts_.driver.clock.steady_us() + parts_.driver.back_within.count();
     }
     co_await await_link();
     co_await await_actor();
@@ -244,7 +244,7 @@ asio::awaitable<Result<void>> Conduct::check_travel(Profile profile, TimeLine re
 
 // Also after the link was away: a robot without one comes to rest by itself.
 asio::awaitable<void> Conduct::await_link() {
-  const std::int64_t ends_us = parts_.driver.clock.steady_us() + kBackWithin.count();
+  const std::int64_t ends_us = parts_.driver.clock.steady_us() + parts_.driver.back_within.count();
   while (!abort_ && robot().link != station::LinkState::connected) {
     if (parts_.driver.clock.steady_us() > ends_us) abort({"link_lost", "the link to the robot broke"});
     co_await changed_.wait_until(parts_.driver.clock, parts_.driver.clock.steady_us() + kLinkLook.count());

@@ -37,11 +37,11 @@ bool comes_before(const Experiment& a, const Experiment& b) {
 }  // namespace
 
 Experiments::Experiments(const DriverParts& parts, storage::RecordingParts& recording, runtime::WorkerThread& maths,
-                         bool allow_unattended)
-    : parts_{parts},
+                         const config::ExperimentRules& rules)
+    : parts_{parts.loop, parts.clock, parts.tasks, parts.station, std::chrono::seconds{rules.back_within_s}},
       recording_{recording},
       maths_{maths},
-      allow_unattended_{allow_unattended},
+      allow_unattended_{rules.allow_unattended},
       writer_{parts.loop, parts.clock, recording.recorder},
       rests_{parts.clock, parts.tasks, parts.station, writer_},
       wake_{parts.loop},
@@ -340,7 +340,8 @@ ExperimentView Experiments::summary_of(const Entry& entry) const {
   if (driver == nullptr || storage::has_ended(view.experiment.state)) return view;
   view.progress = ExperimentProgress{
       entry.conduct->number(),    entry.experiment.runs_planned, entry.conduct->first_step() + driver->step(),
-      entry.profile.steps.size(), driver->elapsed_s(),           driver->duration_s()};
+      entry.profile.steps.size(), driver->elapsed_s(),           driver->duration_s(),
+      driver->goes_on_in_s()};
   return view;
 }
 

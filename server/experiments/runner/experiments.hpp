@@ -18,6 +18,7 @@
 #include <string>
 #include <vector>
 
+#include "server/config/experiment_rules.hpp"
 #include "server/experiments/runner/conduct.hpp"
 #include "server/runtime/ended_right.hpp"
 #include "server/runtime/result.hpp"
@@ -34,6 +35,7 @@ struct ExperimentProgress {
   std::uint32_t run = 0, runs = 0;       // from 1
   std::size_t step = 0, steps = 0;       // from 1
   double elapsed_s = 0, duration_s = 0;  // of the run
+  std::optional<double> goes_on_in_s{};  // in the count-down after an interruption
 };
 
 // What is known of one now. A summary has the counts of its runs, and no run.
@@ -49,7 +51,7 @@ class Experiments final : public station::StationSink {
  public:
   // It receives the reports of the station from now on.
   Experiments(const DriverParts& parts, storage::RecordingParts& recording, runtime::WorkerThread& maths,
-              bool allow_unattended);
+              const config::ExperimentRules& rules);
   ~Experiments() override;
 
   void set_controller_by_name(ControllerByName by_name) { controller_by_name_ = std::move(by_name); }

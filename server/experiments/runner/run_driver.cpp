@@ -170,6 +170,10 @@ void RunDriver::watch_actor(const station::RobotState& robot) {
 void RunDriver::on_samples(const station::SampleBatch& batch) {
   watch_.on_samples(batch, parts_.clock.steady_us());
   const bool is_of_auto = batch.context.mode == rheonaut_MODE_AUTO;
+  if (batch.boot_id == boot_id_ && !batch.samples.empty()) {
+    const std::uint64_t last_us = batch.first_robot_time_us + (batch.samples.size() - 1) * batch.context.period_us;
+    seen_robot_us_ = std::max(seen_robot_us_, last_us);
+  }
   for (std::size_t k = 0; k < batch.samples.size(); ++k) {
     const std::uint64_t made_us = batch.first_robot_time_us + k * batch.context.period_us;
     if (is_of_auto || batch.samples[k].duty != 0) driven_robot_us_ = std::max(driven_robot_us_, made_us);
@@ -183,7 +187,9 @@ void RunDriver::on_samples(const station::SampleBatch& batch) {
 void RunDriver::on_robot(const station::RobotState& robot) {
   if (boot_id_ == 0) return;
   if (robot.boot_id != boot_id_) return abort({"reboot", "the robot has booted again"});
-  if (robot.link != station::LinkState::connected) interrupt(link_lost());
+  if (robot.link == station::LinkState::connected) return;
+  ++link_losses_;
+  interrupt(link_lost());
 }
 
 std::optional<Abort> disturbance_of(const station::CommandRecord& record, const std::string& peer) {
@@ -319,14 +325,15 @@ void RunDriver::note_steps(std::uint64_t robot_now_us) {
 
 // --- its state ---
 
-double RunDriver::elapsed_s() const {
+// In a pause the line stands where it was broken off.
+std::uint64_t RunDriver::shown_robot_us() const {
+  if (paused_robot_us_ != 0) return paused_robot_us_;
   const station::RobotState* robot = parts_.station.find(request_.robot_id);
-  return robot == nullptr ? 0 : static_cast<double>(feed_.tick_at(robot_now_us(*robot))) * kTick_s;
+  return robot == nullptr ? 0 : robot_now_us(*robot);
 }
 
-std::size_t RunDriver::step() const {
-  const station::RobotState* robot = parts_.station.find(request_.robot_id);
-  return robot == nullptr ? 0 : feed_.step_at(robot_now_us(*robot));
-}
+double RunDriver::elapsed_s() const { return static_cast<double>(feed_.tick_at(shown_robot_us())) * kTick_s; }
+
+std::size_t RunDriver::step() const { return feed_.step_at(shown_robot_us()); }
 
 }  // namespace server::experiments

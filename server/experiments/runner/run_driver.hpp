@@ -7,7 +7,7 @@
 // ends a run, the robot is at rest, or in emergency, or somebody else's, when run() returns.
 //
 // Interrupted: the link, a command, samples or a sign of life was late. The robot is at rest, and the run goes on when
-// the same boot is back within kBackWithin, was seen at rest since then, its client has given a sign of life since
+// the same boot is back within `back_within`, was seen at rest since then, its client has given a sign of life since
 // that, and kCountDown has passed; a pause by a person ends that. A duty goes on at the tick where it was broken off,
 // closed-loop steps begin again; what is left must keep within the limits from where the robot is. Not of an unattended
 // one, and never after a stop, a latch, a limit, a taken control or another boot.
@@ -36,7 +36,6 @@
 namespace server::experiments {
 
 inline constexpr microseconds kAbsence{3'000'000};          // in closed loop, without a sign of life
-inline constexpr microseconds kBackWithin{10'000'000};      // after an interruption: link and client
 inline constexpr microseconds kCountDown{3'000'000};        // before it goes on by itself
 inline constexpr microseconds kLongestPause{600'000'000};   // by a person
 inline constexpr microseconds kTakeOverWithin{60'000'000};  // after control has gone to somebody else
@@ -50,6 +49,7 @@ struct DriverParts {
   runtime::Clock& clock;
   runtime::TaskGroup& tasks;
   station::Station& station;
+  microseconds back_within{10'000'000};  // after an interruption: link and client
 };
 
 struct DriveRequest {
@@ -107,8 +107,9 @@ class RunDriver {
   const Abort* pause_reason() const { return pause_ ? &pause_->shown : nullptr; }
   // By a person, or until one comes.
   const Abort* held_by() const { return pause_ && !pause_->ends_by_itself ? &pause_->why : nullptr; }
-  double elapsed_s() const;  // of the line
-  std::size_t step() const;  // that runs now, of the line from 0
+  std::optional<double> goes_on_in_s() const;  // in a count-down
+  double elapsed_s() const;                    // of the line
+  std::size_t step() const;                    // that runs now, of the line from 0
   double duration_s() const { return line_.duration_s(); }
   const std::vector<StepBegin>& step_begins() const { return begins_; }
 
@@ -127,6 +128,13 @@ class RunDriver {
     std::int64_t goes_on_at_us = 0;  // steady; 0: not yet
   };
 
+  // Of an interruption that is over, by whatever way.
+  struct InterruptionNote {
+    RunDriver& driver;
+    Abort cause;
+    ~InterruptionNote();
+  };
+
   // Where the line was broken off.
   struct Place {
     std::size_t step = 0;
@@ -140,7 +148,10 @@ class RunDriver {
   boost::asio::awaitable<Rest> rest(bool ends_with_link);
   void go_on_from(Place place);
   void count_interruption(Place place, std::int64_t since_us);
-  Place broken_off(std::uint64_t noticed_us) const;
+  std::uint64_t broken_off(std::uint64_t noticed_us) const;
+  Place place_of(std::uint64_t tick) const;
+  void note_interruption(std::uint64_t from_robot_us, Abort cause) const;
+  std::uint64_t shown_robot_us() const;
   void spawn(boost::asio::awaitable<void> task);
   void on_own_command(const station::CommandRecord& record);
   std::optional<Abort> unrecorded(const station::RobotState& robot) const;
@@ -190,10 +201,13 @@ class RunDriver {
   bool has_lapsed_ = false;                   // control, with the signs of life of its client
   std::int64_t rested_at_us_ = 0;             // steady: seen at rest, in a pause
   std::uint64_t generation_robot_us_ = 0;     // when it began
-  std::uint64_t driven_robot_us_ = 0;         // latest sample of this boot with the motor on, or in auto
-  int generation_ = 0;                        // of what was sent: a pause ends one
-  std::set<station::CommandId> accepted_;     // commands of this generation that wait on the robot, or have acted
-  int on_their_way_ = 0;                      // tasks of its own
+  std::uint64_t paused_robot_us_ = 0;         // where the line was broken off; 0: it goes on
+  std::uint64_t seen_robot_us_ = 0;           // latest sample of this boot
+  int link_losses_ = 0;
+  std::uint64_t driven_robot_us_ = 0;      // latest sample of this boot with the motor on, or in auto
+  int generation_ = 0;                     // of what was sent: a pause ends one
+  std::set<station::CommandId> accepted_;  // commands of this generation that wait on the robot, or have acted
+  int on_their_way_ = 0;                   // tasks of its own
   bool is_renewing_ = false;
   runtime::Signal changed_;
 };

@@ -1,10 +1,12 @@
 // How a run is paused or interrupted, and goes on from where it was broken off.
 #include <fmt/format.h>
+#include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <utility>
 
 #include "server/experiments/runner/run_driver.hpp"
+#include "server/runtime/exceptions.hpp"
 
 namespace server::experiments {
 namespace asio = boost::asio;
@@ -50,16 +52,45 @@ asio::awaitable<void> RunDriver::stay_paused() {
   const station::RobotState& robot = *parts_.station.find(request_.robot_id);
   const std::uint64_t noticed_us = std::min(robot_now_us(robot), robot.latest_robot_time_us + kLongestLeaseUs);
   const std::int64_t since_us = pause_->since_us;
+  std::uint64_t tick = broken_off(noticed_us);
+  paused_robot_us_ = feed_.robot_time_us(tick);
+  const InterruptionNote note{*this, pause_->why};  // also where this is cancelled
   begin_generation();
-  Place place;
+  bool is_away = false;
   do {  // SAFETY: a pause that comes while the way is computed holds it
     co_await until_over_pause(noticed_us);
-    place = broken_off(noticed_us);  // samples of then may have come since
-    if (!abort_) co_await check_travel(place);
-  } while (!abort_ && !is_over_pause(*parts_.station.find(request_.robot_id), true));
-  if (!abort_ && pause_->ends_by_itself) count_interruption(place, since_us);
-  pause_.reset();
-  if (!abort_) go_on_from(place);
+    const int losses = link_losses_;
+    tick = broken_off(noticed_us);  // samples of then may have come since
+    paused_robot_us_ = feed_.robot_time_us(tick);
+    if (!abort_) co_await check_travel(place_of(tick));
+    const station::RobotState& now = *parts_.station.find(request_.robot_id);
+    is_away = losses != link_losses_ || now.link != station::LinkState::connected;
+    // SAFETY: who asked before the link was back, or the count-down of then, says nothing of now.
+    if (is_away) pause_->is_resumed = false, pause_->goes_on_at_us = 0;
+  } while (!abort_ && (is_away || !is_over_pause(*parts_.station.find(request_.robot_id), true)));
+  if (!abort_ && pause_->ends_by_itself) count_interruption(place_of(tick), since_us);
+  if (!abort_) go_on_from(place_of(tick));
+}
+
+RunDriver::InterruptionNote::~InterruptionNote() {
+  try {
+    driver.note_interruption(std::exchange(driver.paused_robot_us_, 0), cause);
+  } catch (const std::exception& error) {
+    spdlog::error("an interruption of a run is not noted: {}", runtime::text_of(error));
+  }
+  driver.pause_.reset();
+}
+
+// It lasts until the line goes on.
+void RunDriver::note_interruption(std::uint64_t from_robot_us, Abort cause) const {
+  const station::RobotState& robot = *parts_.station.find(request_.robot_id);
+  const bool is_of_now = robot.boot_id == boot_id_;  // else the robot has booted again, and its clock is another one
+  const std::uint64_t now_us = is_of_now ? robot_now_us(robot) : seen_robot_us_;
+  const std::uint64_t to_robot_us = abort_ ? now_us : std::max(now_us, feed_.begins_at_robot_us());
+  if (to_robot_us <= from_robot_us) return;
+  const double length_s = static_cast<double>(to_robot_us - from_robot_us) / 1e6;
+  if (pause_ && pause_->why.reason == cause.reason) cause = pause_->why;  // in the words of the end
+  parts_.station.note_interruption(request_.robot_id, {boot_id_, from_robot_us, length_s}, cause.reason, cause.detail);
 }
 
 // Returns with the robot seen at rest by this boot since its link is there, or in emergency, or to be aborted.
@@ -78,7 +109,7 @@ asio::awaitable<void> RunDriver::until_over_pause(std::uint64_t noticed_us) {
       if (found == Rest::away) continue;
       resting = found;
       rested_at_us_ = parts_.clock.steady_us();
-      if (found == Rest::at_rest) co_await check_travel(broken_off(noticed_us));
+      if (found == Rest::at_rest) co_await check_travel(place_of(broken_off(noticed_us)));
       continue;
     }
     if (is_linked && away_since_us != 0) note_away(std::exchange(away_since_us, 0));
@@ -102,12 +133,16 @@ void RunDriver::note_away(std::int64_t since_us) {
 
 // Where the motor was on last; what was commanded behind that has not been done, if it is not long ago. A robot that
 // loses its link goes on for as long as its lease lasts.
-RunDriver::Place RunDriver::broken_off(std::uint64_t noticed_us) const {
+std::uint64_t RunDriver::broken_off(std::uint64_t noticed_us) const {
   const std::uint64_t first = feed_.tick_at(0), noticed = feed_.tick_at(noticed_us);
   const std::uint64_t earliest = std::max(noticed - std::min(noticed, kMostUndoneTicks), first);
   const bool has_moved = driven_robot_us_ >= feed_.robot_time_us(first);
   const std::uint64_t driven = has_moved ? feed_.tick_at(driven_robot_us_) + 1 : first;
-  const std::uint64_t tick = std::clamp(driven, earliest, std::min(noticed + kMostAheadTicks, line_.ticks));
+  return std::clamp(driven, earliest, std::min(noticed + kMostAheadTicks, line_.ticks));
+}
+
+// Where the line goes on: there, or in closed loop where these steps begin.
+RunDriver::Place RunDriver::place_of(std::uint64_t tick) const {
   const auto after = std::ranges::upper_bound(line_.step_begins, tick);
   const auto step = static_cast<std::size_t>(after - line_.step_begins.begin()) - 1;
   if (!is_of_auto(line_, step)) return {step, tick};
@@ -166,7 +201,9 @@ void RunDriver::check_pause_limit() {
   const std::int64_t paused_us = parts_.clock.steady_us() - pause_->since_us;
   const bool is_of_control = pause_->why.reason == "control_changed";
   if (pause_->goes_on_at_us != 0) return;
-  const microseconds limit = pause_->ends_by_itself ? kBackWithin : is_of_control ? kTakeOverWithin : kLongestPause;
+  const microseconds limit = pause_->ends_by_itself ? parts_.back_within
+                             : is_of_control        ? kTakeOverWithin
+                                                    : kLongestPause;
   if (paused_us <= limit.count()) return;
   if (pause_->ends_by_itself || is_of_control) return abort(pause_->why);
   abort({"paused_too_long", fmt::format("it was paused for {} s", limit / 1s)});
@@ -203,6 +240,11 @@ bool RunDriver::counts_down() {
   pause_->shown.detail = fmt::format("{}; it goes on in {} s unless it is paused", pause_->why.detail,
                                      std::max<std::int64_t>(0, (left_us + 999'999) / 1'000'000));
   return left_us <= 0;
+}
+
+std::optional<double> RunDriver::goes_on_in_s() const {
+  if (!pause_ || !pause_->ends_by_itself || pause_->goes_on_at_us == 0) return std::nullopt;
+  return static_cast<double>(std::max<std::int64_t>(0, pause_->goes_on_at_us - parts_.clock.steady_us())) / 1e6;
 }
 
 // SAFETY: who takes control meanwhile, or gives it up while they are there, decides that nothing goes on by itself.

@@ -69,6 +69,13 @@ struct RobotEvent {
   std::int64_t received_at_us = 0;  // UTC
 };
 
+// A stretch of time of one boot.
+struct BootPart {
+  BootId boot_id = 0;
+  std::uint64_t from_robot_us = 0;
+  double length_s = 0;
+};
+
 enum class LinkState : std::uint8_t { disconnected, connected };
 const char* text(LinkState value);
 

@@ -106,15 +106,15 @@ std::vector<RunId> old_runs(SQLite::Database& database, std::int64_t before_us) 
 
 }  // namespace
 
-RunFinalizer::RunFinalizer(runtime::Clock& clock, Recorder& recorder, DatabaseReader& reader, RunDigester& digester,
-                           std::uint32_t after_days)
+RunFinalizer::RunFinalizer(runtime::Clock& clock, const RemovalClock& removal_clock, Recorder& recorder,
+                           DatabaseReader& reader, RunDigester& digester, std::uint32_t after_days)
     : clock_{clock},
       recorder_{recorder},
       reader_{reader},
       digester_{digester},
+      removal_clock_{removal_clock},
       after_days_{after_days},
-      begun_us_{clock.steady_us()},
-      utc_minus_steady_us_{clock.utc_us() - clock.steady_us()} {}
+      begun_us_{clock.steady_us()} {}
 
 asio::awaitable<void> RunFinalizer::run() {
   for (;;) {
@@ -154,10 +154,7 @@ asio::awaitable<void> RunFinalizer::finalize_old_runs() {
 }
 
 // Nothing grows old by a clock that is set forward.
-std::int64_t RunFinalizer::old_before_us() const {
-  const std::int64_t utc_minus_steady_us = std::min(clock_.utc_us() - clock_.steady_us(), utc_minus_steady_us_);
-  return clock_.steady_us() + utc_minus_steady_us - after_days_ * kDayUs;
-}
+std::int64_t RunFinalizer::old_before_us() const { return removal_clock_.utc_us() - after_days_ * kDayUs; }
 
 asio::awaitable<Result<std::uint64_t>> RunFinalizer::finalize(RunId run, std::uint64_t samples, station::Author by) {
   auto query = [run](SQLite::Database& database) { return order_for(database, run); };

@@ -15,6 +15,7 @@
 #include "server/runtime/result.hpp"
 #include "server/station/state/audit_note.hpp"
 #include "server/storage/database/database_reader.hpp"
+#include "server/storage/database/removal_clock.hpp"
 #include "server/storage/ingest/recorder.hpp"
 #include "server/storage/runs/run_digester.hpp"
 
@@ -23,8 +24,8 @@ namespace server::storage {
 class RunFinalizer {
  public:
   // `after_days`: 0 for never.
-  RunFinalizer(runtime::Clock& clock, Recorder& recorder, DatabaseReader& reader, RunDigester& digester,
-               std::uint32_t after_days);
+  RunFinalizer(runtime::Clock& clock, const RemovalClock& removal_clock, Recorder& recorder, DatabaseReader& reader,
+               RunDigester& digester, std::uint32_t after_days);
 
   // Looks for what is to be given up every 30 s, until cancelled.
   boost::asio::awaitable<void> run();
@@ -48,10 +49,10 @@ class RunFinalizer {
   Recorder& recorder_;
   DatabaseReader& reader_;
   RunDigester& digester_;
+  const RemovalClock& removal_clock_;
   std::uint32_t after_days_;
-  std::int64_t looked_at_us_ = 0;         // steady
-  std::int64_t begun_us_ = 0;             // steady
-  std::int64_t utc_minus_steady_us_ = 0;  // then
+  std::int64_t looked_at_us_ = 0;  // steady
+  std::int64_t begun_us_ = 0;      // steady
 };
 
 }  // namespace server::storage

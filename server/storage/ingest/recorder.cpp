@@ -1,5 +1,6 @@
 #include "server/storage/ingest/recorder.hpp"
 
+#include <fmt/chrono.h>
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
@@ -17,6 +18,7 @@ using namespace std::chrono_literals;
 namespace {
 
 constexpr microseconds kCommitInterval = 100ms;
+constexpr microseconds kBehind = 1min;
 // Boots in one turn of the loop, which must not take over 1 ms; for those that are reported a robot gets a frame each.
 constexpr std::size_t kBootsInATurn = 128;
 constexpr std::size_t kReportsInATurn = 32;
@@ -26,6 +28,21 @@ station::AuditNote of_station(const char* action, std::int64_t utc_us) {
   note.by = {"station", "", utc_us};
   note.action = action;
   return note;
+}
+
+// 0: there is none.
+std::int64_t newest_audit_us(Database& database) {
+  SQLite::Statement newest{database.handle(), "SELECT at_us FROM audit ORDER BY entry DESC LIMIT 1"};
+  return newest.executeStep() ? newest.getColumn(0).getInt64() : 0;
+}
+
+void warn_if_behind(std::int64_t now_us, std::int64_t newest_us) {
+  const std::int64_t behind_us = newest_us - now_us;
+  if (behind_us < kBehind.count()) return;
+  spdlog::warn(
+      "the clock of this computer is {} s behind what was recorded last, {:%F %T} UTC: it is wrong now, or was wrong "
+      "then; set it before anything is recorded",
+      behind_us / 1'000'000, fmt::gmtime(static_cast<std::time_t>(newest_us / 1'000'000)));
 }
 
 }  // namespace
@@ -47,6 +64,8 @@ Recorder::~Recorder() = default;
 asio::awaitable<RestoredState> Recorder::open() {
   OpenedDatabase opened = co_await database_.open(clock_.utc_us());
   boots_ = std::make_unique<BootRegistry>(opened.next_boot_key, opened.restored_at_us);
+  const std::int64_t newest_us = co_await on_disk(newest_audit_us);
+  warn_if_behind(clock_.utc_us(), newest_us);
   station::AuditNote started = of_station("station.started", clock_.utc_us());
   started.detail = fmt::format(R"({{"version":"{}","store_id":"{}"}})", base::version(), opened.restored.store_id);
   on_audit(started);

@@ -97,7 +97,7 @@ std::vector<JobFile> files_to_keep(std::vector<JobFile> files, std::int64_t now_
 }
 
 asio::awaitable<void> JobFiles::open() {
-  auto clean = [folder = folder_, now_s = clock_.utc_us() / 1'000'000](SQLite::Database& database) {
+  auto clean = [folder = folder_, now_s = old_by_s()](SQLite::Database& database) {
     remove_drafts(folder);
     remove_not_done(database, folder);
     remove_surplus(folder, now_s);
@@ -115,7 +115,8 @@ asio::awaitable<fs::path> JobFiles::begin_draft(JobId job) {
 }
 
 asio::awaitable<Result<JobFile>> JobFiles::finish(JobId job, std::string ending) {
-  auto finish = [folder = folder_, job, ending, now_s = clock_.utc_us() / 1'000'000]() -> Result<JobFile> {
+  auto finish = [folder = folder_, job, ending, now_s = clock_.utc_us() / 1'000'000,
+                 old_by_s = old_by_s()]() -> Result<JobFile> {
     const fs::path draft = draft_in(folder, job);
     JobFile file{job, now_s, ending, folder / fmt::format("job-{}-{}.{}", job, now_s, ending), fs::file_size(draft)};
     if (file.size_bytes > kMaxJobFileBytes) {
@@ -125,7 +126,7 @@ asio::awaitable<Result<JobFile>> JobFiles::finish(JobId job, std::string ending)
                   "too_large");
     }
     finish_file(draft, file.path);
-    remove_surplus(folder, now_s);
+    remove_surplus(folder, old_by_s);
     return file;
   };
   co_return co_await reader_.run(std::move(finish));
@@ -143,7 +144,7 @@ asio::awaitable<void> JobFiles::remove(JobId job) {
 }
 
 asio::awaitable<std::optional<JobFile>> JobFiles::find(JobId job) {
-  auto find = [folder = folder_, job, now_s = clock_.utc_us() / 1'000'000]() -> std::optional<JobFile> {
+  auto find = [folder = folder_, job, now_s = old_by_s()]() -> std::optional<JobFile> {
     for (JobFile& file : files_to_keep(files_in(folder), now_s)) {
       if (file.job == job) return std::move(file);
     }

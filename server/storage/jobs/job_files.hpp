@@ -19,6 +19,7 @@
 #include "server/runtime/clock.hpp"
 #include "server/runtime/result.hpp"
 #include "server/storage/database/database_reader.hpp"
+#include "server/storage/database/removal_clock.hpp"
 #include "server/storage/jobs/job.hpp"
 
 namespace server::storage {
@@ -42,8 +43,10 @@ std::vector<JobFile> files_to_keep(std::vector<JobFile> files, std::int64_t now_
 
 class JobFiles {
  public:
-  JobFiles(runtime::Clock& clock, DatabaseReader& reader, std::filesystem::path folder)
-      : clock_{clock}, reader_{reader}, folder_{std::move(folder)} {}
+  // `removal_clock`: by which files grow old.
+  JobFiles(runtime::Clock& clock, const RemovalClock& removal_clock, DatabaseReader& reader,
+           std::filesystem::path folder)
+      : clock_{clock}, removal_clock_{removal_clock}, reader_{reader}, folder_{std::move(folder)} {}
 
   const std::filesystem::path& folder() const { return folder_; }
 
@@ -62,7 +65,10 @@ class JobFiles {
   boost::asio::awaitable<std::optional<JobFile>> find(JobId job);  // none: it has none any more
 
  private:
+  std::int64_t old_by_s() const { return removal_clock_.utc_us() / 1'000'000; }
+
   runtime::Clock& clock_;
+  const RemovalClock& removal_clock_;
   DatabaseReader& reader_;
   std::filesystem::path folder_;
 };

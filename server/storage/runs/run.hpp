@@ -71,6 +71,16 @@ struct MissedTicks {
   bool operator==(const MissedTicks&) const = default;
 };
 
+// A part of a run in which the experiment that made it was paused or interrupted: the robot came to rest and waited. It
+// is recorded like the rest; a fit simulates through it.
+struct InterruptedPart {
+  std::uint32_t span = 0;
+  std::uint64_t from_robot_us = 0;  // the first tick at which the line did not go on
+  std::uint64_t to_robot_us = 0;    // from here on it did
+  std::string reason;               // for programs, e.g. "link_lost"
+  std::string detail;
+};
+
 struct Run {
   RunId id = 0;
   station::RobotId robot_id;
@@ -87,8 +97,9 @@ struct Run {
   std::vector<RunSpan> spans;
   std::uint64_t samples_expected = 0;  // so far, in all spans
   std::uint64_t samples_stored = 0;
-  std::uint64_t samples_lost = 0;     // known to be lost for good; expected - stored - lost is still on its way
-  std::optional<MissedTicks> missed;  // counted with the digest, when the run has ended; none: not yet
+  std::uint64_t samples_lost = 0;            // known to be lost for good; expected - stored - lost is still on its way
+  std::optional<MissedTicks> missed;         // counted with the digest, when the run has ended; none: not yet
+  std::vector<InterruptedPart> interrupted;  // in order of time
 };
 
 // What a run was made with, as far as it is known.

@@ -4,8 +4,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 
 #include "server/storage/database/statement.hpp"
+#include "server/storage/samples/boot_times.hpp"
 
 namespace server::storage {
 
@@ -15,6 +18,8 @@ const char* const kRunColumns =
     " made_afterwards, made_by, profile";
 
 namespace {
+
+constexpr std::int64_t kInterruptionsSince = 12;  // schema
 
 Run run_from(SQLite::Statement& row) {
   Run run;
@@ -41,6 +46,43 @@ Run run_from(SQLite::Statement& row) {
   return run;
 }
 
+// The parts of runs in which their experiments were interrupted.
+class Interruptions {
+ public:
+  explicit Interruptions(SQLite::Database& database) : database_{database} {}
+
+  // Those of the run's last span, as far as they lie in it: an experiment may have made more than is of this run.
+  void add_to(Run& run, std::int64_t boot_key) {
+    bind_all(any_, boot_key);
+    if (!any_.executeStep()) return;
+    times_.enter(boot_key);
+    const RunSpan& span = run.spans.back();
+    const auto first = times_.of(span.first_seq);
+    const auto next = span.last_seq ? times_.of(*span.last_seq + 1) : std::nullopt;
+    const std::uint64_t begins_us = first ? first->robot_time_us : 0;
+    const std::uint64_t ends_us = next ? next->robot_time_us : std::numeric_limits<std::int64_t>::max();
+    bind_all(parts_, boot_key, begins_us, ends_us);
+    while (parts_.executeStep()) {
+      const std::uint64_t from_us = unsigned_id(parts_.getColumn(0));
+      const auto length_us = static_cast<std::uint64_t>(std::llround(1e6 * parts_.getColumn(1).getDouble()));
+      InterruptedPart part{static_cast<std::uint32_t>(run.spans.size() - 1), std::max(from_us, begins_us),
+                           std::min(from_us + length_us, ends_us), parts_.getColumn(2).getString(),
+                           parts_.getColumn(3).getString()};
+      if (part.from_robot_us < part.to_robot_us) run.interrupted.push_back(std::move(part));
+    }
+  }
+
+ private:
+  SQLite::Database& database_;
+  SQLite::Statement any_{database_,
+                         "SELECT 1 FROM event WHERE boot_key = ? AND kind = 'experiment_interrupted' LIMIT 1"};
+  SQLite::Statement parts_{database_,
+                           "SELECT robot_time_us, value, cause, detail FROM event WHERE boot_key = ?1"
+                           " AND kind = 'experiment_interrupted' AND robot_time_us < ?3"
+                           " AND robot_time_us + value * 1e6 > ?2 ORDER BY robot_time_us"};
+  BootTimes times_{database_};
+};
+
 // Fills in spans and counts, run by run.
 class RunReading {
  public:
@@ -55,6 +97,7 @@ class RunReading {
           .boot_id = unsigned_id(spans_.getColumn(1)), .first_seq = unsigned_id(spans_.getColumn(2)), .last_seq = {}};
       if (!spans_.getColumn(3).isNull()) span.last_seq = unsigned_id(spans_.getColumn(3));
       run.spans.push_back(span);
+      interruptions_.add_to(run, boot_key);
       if (!has_digest) count(run, span, boot_key, unsigned_id(spans_.getColumn(4)));
     }
   }
@@ -107,6 +150,7 @@ class RunReading {
   SQLite::Statement lost_{database_,
                           "SELECT coalesce(sum(min(last_seq, ?3) - max(first_seq, ?2) + 1), 0) FROM gap"
                           " WHERE boot_key = ?1 AND first_seq <= ?3 AND last_seq >= ?2"};
+  Interruptions interruptions_{database_};
 };
 
 }  // namespace
@@ -135,6 +179,22 @@ std::optional<Run> find_run(SQLite::Database& database, const BootHeads& heads, 
   Run run = run_from(query);
   RunReading{database, heads}.complete(run);
   return run;
+}
+
+std::vector<InterruptedPart> read_interrupted_parts(SQLite::Database& database, RunId id) {
+  Run run;
+  if (database.execAndGet("PRAGMA user_version").getInt64() < kInterruptionsSince) return {};
+  Interruptions interruptions{database};
+  SQLite::Statement spans{database,
+                          "SELECT boot_key, first_seq, last_seq FROM run_span WHERE run_id = ? ORDER BY span"};
+  bind_all(spans, id);
+  while (spans.executeStep()) {
+    RunSpan span{.boot_id = 0, .first_seq = unsigned_id(spans.getColumn(1)), .last_seq = {}};
+    if (!spans.getColumn(2).isNull()) span.last_seq = unsigned_id(spans.getColumn(2));
+    run.spans.push_back(span);
+    interruptions.add_to(run, spans.getColumn(0).getInt64());
+  }
+  return std::move(run.interrupted);
 }
 
 std::optional<RunState> read_run_state(SQLite::Database& database, RunId id) {

@@ -20,6 +20,8 @@ namespace server::storage {
 using BootHeads = std::map<station::BootId, std::uint64_t>;
 
 std::optional<Run> find_run(SQLite::Database& database, const BootHeads& heads, RunId id);
+// Of a database of any schema. Empty: none, or there is no such run.
+std::vector<InterruptedPart> read_interrupted_parts(SQLite::Database& database, RunId id);
 std::optional<RunState> read_run_state(SQLite::Database& database, RunId id);
 std::vector<Run> list_runs(SQLite::Database& database, const BootHeads& heads, const RunFilter& filter);
 

@@ -7,6 +7,7 @@
 
 #include <system_error>
 
+#include "server/config/file_system.hpp"
 #include "server/runtime/exceptions.hpp"
 #include "server/storage/database/disk_reserve.hpp"
 
@@ -17,7 +18,7 @@ using namespace std::chrono_literals;
 
 namespace {
 
-constexpr microseconds kLookInterval = 5s;
+constexpr microseconds kLookInterval = 5s, kWarnInterval = 1h;
 constexpr std::uint64_t kMegabyte = 1'000'000;
 
 }  // namespace
@@ -52,13 +53,27 @@ std::uint64_t file_bytes(const fs::path& path) {
 }
 
 DiskWatch::DiskWatch(runtime::Clock& clock, runtime::WorkerThread& readers, fs::path database, SpaceLimits limits)
-    : clock_{clock}, readers_{readers}, database_{std::move(database)}, limits_{limits} {}
+    : clock_{clock}, readers_{readers}, database_{std::move(database)}, limits_{limits} {
+  file_system_ = [](const fs::path& folder) { return config::unsuitable_file_system(folder); };
+}
 
 asio::awaitable<void> DiskWatch::run() {
+  std::int64_t warned_at_us = clock_.steady_us() - kWarnInterval.count();
   for (;;) {
+    if (clock_.steady_us() - warned_at_us >= kWarnInterval.count()) {
+      warned_at_us = clock_.steady_us();
+      co_await warn_of_file_system();
+    }
     co_await clock_.sleep_for(kLookInterval);
     co_await look();
   }
+}
+
+asio::awaitable<void> DiskWatch::warn_of_file_system() {
+  const fs::path folder = fs::absolute(database_).parent_path();
+  auto ask = [file_system = file_system_, folder] { return file_system(folder); };
+  const std::string unsuitable = co_await readers_.run(std::move(ask));
+  if (!unsuitable.empty()) spdlog::warn("{}", config::unsuitable_in_words(unsuitable, folder));
 }
 
 asio::awaitable<void> DiskWatch::look() {

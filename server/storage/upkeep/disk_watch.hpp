@@ -46,10 +46,11 @@ std::uint64_t file_bytes(const std::filesystem::path& path);  // 0 when it is no
 class DiskWatch {
  public:
   using FreeBytes = std::function<std::uint64_t(const std::filesystem::path& folder)>;
+  using FileSystem = std::function<std::string(const std::filesystem::path& folder)>;
 
   DiskWatch(runtime::Clock& clock, runtime::WorkerThread& readers, std::filesystem::path database, SpaceLimits limits);
 
-  // Looks every 5 s, until cancelled.
+  // Looks every 5 s, until cancelled; and each hour at the file system, which may be one that damages a store.
   boost::asio::awaitable<void> run();
   boost::asio::awaitable<void> look();
 
@@ -62,15 +63,19 @@ class DiskWatch {
 
   // Another way to ask the disk, from the next look on: for tests. Called on the readers' thread.
   void set_free_bytes(FreeBytes free_bytes) { free_bytes_ = std::move(free_bytes); }
+  // Another unsuitable_file_system(): for tests, as above.
+  void set_file_system(FileSystem file_system) { file_system_ = std::move(file_system); }
 
  private:
   void enter(SpaceState state);
+  boost::asio::awaitable<void> warn_of_file_system();
 
   runtime::Clock& clock_;
   runtime::WorkerThread& readers_;
   std::filesystem::path database_;
   SpaceLimits limits_;
   FreeBytes free_bytes_ = free_bytes_of;
+  FileSystem file_system_;
   SpaceState state_ = SpaceState::ok;
   DiskUse use_;
 };

@@ -13,6 +13,7 @@
 #include "server/storage/database/database.hpp"
 #include "server/storage/database/file_check.hpp"
 #include "server/storage/database/finished_file.hpp"
+#include "server/storage/database/foreign_file.hpp"
 #include "server/storage/database/schema.hpp"
 #include "server/storage/database/statement.hpp"
 #include "server/storage/runs/run_store.hpp"
@@ -78,7 +79,11 @@ RestoredStore restore_database(const fs::path& from, const fs::path& folder, con
   try {
     copy_database(from, draft.path());
     SQLite::Database written{draft.path().string(), SQLite::OPEN_READWRITE};
+    guard_foreign(written);
     if (written.execAndGet("PRAGMA application_id").getInt64() != kApplicationId) refuse(from, "it is not a backup");
+    if (const auto strange = strange_in_schema(written)) {
+      refuse(from, fmt::format("no version of this program wrote its {}", *strange));
+    }
     const std::string damage = find_damage(written);
     if (!damage.empty()) refuse(from, "it is damaged: " + damage);
   } catch (const SQLite::Exception& error) {

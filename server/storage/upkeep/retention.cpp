@@ -21,6 +21,7 @@ constexpr microseconds kLookInterval = 30s;
 constexpr microseconds kPause = 10ms;  // at least, between two steps
 constexpr microseconds kPauseWhenBehind = 1s;
 constexpr std::int64_t kDayUs = 86'400'000'000;
+constexpr microseconds kKeepClockEvery = 10min;
 constexpr const char* kNextEventRow = "SELECT coalesce(max(event_row), 0) + 1 FROM event";
 // The database is made smaller from this part of its limit on, to that part: so that the file need not grow over it.
 constexpr std::uint64_t kBeginPercent = 95;
@@ -53,15 +54,16 @@ std::uint64_t pragma(SQLite::Database& database, const char* name) {
 }  // namespace
 
 Retention::Retention(runtime::Clock& clock, Recorder& recorder, DatabaseReader& reader, const DiskWatch& disk_watch,
-                     OutsideReferences& references, RetentionPolicy policy)
+                     OutsideReferences& references, RemovalClock& removal_clock, RetentionPolicy policy)
     : clock_{clock},
       recorder_{recorder},
       reader_{reader},
       disk_watch_{disk_watch},
       references_{references},
+      removal_clock_{removal_clock},
       policy_{policy},
-      ages_{clock, policy.retention_days * kDayUs},
-      event_ages_{clock, policy.event_retention_days * kDayUs} {}
+      ages_{removal_clock, policy.retention_days * kDayUs},
+      event_ages_{removal_clock, policy.event_retention_days * kDayUs} {}
 
 asio::awaitable<void> Retention::open() {
   ages_.begin(co_await next_row());
@@ -71,12 +73,22 @@ asio::awaitable<void> Retention::open() {
 asio::awaitable<void> Retention::run() {
   for (;;) {
     co_await clock_.sleep_for(kLookInterval);
+    removal_clock_.look();
     try {
+      co_await keep_clock();
       co_await pass();
     } catch (const SQLite::Exception& error) {  // an unreadable page is no reason to end the emergency stop
       spdlog::error("what is to be removed cannot be found: {}; looked at again in 30 s", runtime::text_of(error));
     }
   }
+}
+
+asio::awaitable<void> Retention::keep_clock() {
+  const bool is_due = clock_.steady_us() - clock_stored_at_us_ >= kKeepClockEvery.count();
+  if (!is_due || recorder_.failing()) co_return;
+  clock_stored_at_us_ = clock_.steady_us();
+  auto store = [state = removal_clock_.state()](Database& database) { store_removal_clock(database.handle(), state); };
+  co_await recorder_.on_disk(std::move(store));
 }
 
 asio::awaitable<void> Retention::pass() {

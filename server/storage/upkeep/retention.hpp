@@ -38,12 +38,12 @@ struct RetentionCounters {
 class Retention {
  public:
   Retention(runtime::Clock& clock, Recorder& recorder, DatabaseReader& reader, const DiskWatch& disk_watch,
-            OutsideReferences& references, RetentionPolicy policy);
+            OutsideReferences& references, RemovalClock& removal_clock, RetentionPolicy policy);
 
   // Before robots arrive: what is stored now, an earlier start has written.
   boost::asio::awaitable<void> open();
 
-  // Looks every 30 s, until cancelled.
+  // Looks every 30 s, until cancelled; also at the clock, whose state it keeps for the next start.
   boost::asio::awaitable<void> run();
   // Removes all that is to go now.
   boost::asio::awaitable<void> pass();
@@ -64,6 +64,7 @@ class Retention {
   void note_use(std::uint64_t used_bytes);  // after what could go has gone
   boost::asio::awaitable<void> shrink();
   boost::asio::awaitable<Size> size();
+  boost::asio::awaitable<void> keep_clock();
   boost::asio::awaitable<std::int64_t> next_row();
   boost::asio::awaitable<std::int64_t> next_event_row();
   boost::asio::awaitable<void> make_room_for_commits(std::int64_t took_us);
@@ -73,6 +74,8 @@ class Retention {
   DatabaseReader& reader_;
   const DiskWatch& disk_watch_;
   OutsideReferences& references_;
+  RemovalClock& removal_clock_;
+  std::int64_t clock_stored_at_us_ = 0;  // steady
   RetentionPolicy policy_;
   SampleAges ages_;
   SampleAges event_ages_;              // of rows of events

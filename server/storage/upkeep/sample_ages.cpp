@@ -1,13 +1,10 @@
 // A queue of notes; those that a later one makes needless are dropped.
 #include "server/storage/upkeep/sample_ages.hpp"
 
-#include <algorithm>
-
 namespace server::storage {
 
 void SampleAges::begin(std::int64_t next_row) {
   begun_row_ = next_row;
-  utc_minus_steady_us_ = clock_.utc_us() - clock_.steady_us();
   notes_ = {{clock_.steady_us(), next_row}};
 }
 
@@ -20,8 +17,7 @@ void SampleAges::note(std::int64_t next_row) {
 
 AgeLimit SampleAges::limit() const {
   const std::int64_t then_us = clock_.steady_us() - age_us_;
-  const std::int64_t utc_minus_steady_us = std::min(clock_.utc_us() - clock_.steady_us(), utc_minus_steady_us_);
-  AgeLimit limit{0, begun_row_, then_us + utc_minus_steady_us};
+  AgeLimit limit{0, begun_row_, clock_.utc_us() - age_us_};
   for (const Note& note : notes_) {
     if (note.steady_us <= then_us) limit.row = note.next_row;
   }

@@ -2,8 +2,7 @@
 //
 // Rows are numbered in the order in which they are written. So it is enough to note, from time to time, the steady time
 // and the number of the next row: all below it are older than the note. What an earlier start of the program has
-// written has only the UTC of its arrival; that is compared with the UTC at the beginning of this start and the time
-// since, or with the present one if that is earlier: nothing grows old by a clock that is set.
+// written has only the UTC of its arrival; that is compared with the time by which things grow old (RemovalClock).
 //
 // Loop thread. Steady times and UTC in microseconds.
 #pragma once
@@ -11,7 +10,7 @@
 #include <cstdint>
 #include <deque>
 
-#include "server/runtime/clock.hpp"
+#include "server/storage/database/removal_clock.hpp"
 
 namespace server::storage {
 
@@ -29,7 +28,7 @@ struct AgeLimit {
 class SampleAges {
  public:
   // The age that is asked for. It is kept to a hundredth.
-  SampleAges(const runtime::Clock& clock, std::int64_t age_us) : clock_{clock}, age_us_{age_us} {}
+  SampleAges(const RemovalClock& clock, std::int64_t age_us) : clock_{clock}, age_us_{age_us} {}
 
   // The program writes rows from this one on.
   void begin(std::int64_t next_row);
@@ -44,11 +43,10 @@ class SampleAges {
     std::int64_t next_row = 0;
   };
 
-  const runtime::Clock& clock_;
+  const RemovalClock& clock_;
   std::int64_t age_us_;
   std::int64_t begun_row_ = 0;
-  std::int64_t utc_minus_steady_us_ = 0;  // at the beginning
-  std::deque<Note> notes_;                // the first one is the latest that is old enough, if any is
+  std::deque<Note> notes_;  // the first one is the latest that is old enough, if any is
 };
 
 }  // namespace server::storage

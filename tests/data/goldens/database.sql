@@ -279,10 +279,13 @@ CREATE TABLE meta (
   name TEXT PRIMARY KEY,
   value INTEGER NOT NULL
 ) WITHOUT ROWID;
+INSERT INTO meta VALUES('clock_doubted_for_us',0);
+INSERT INTO meta VALUES('clock_seen_utc_us',1795579572000000);
 INSERT INTO meta VALUES('commands_before_audit',0);
 INSERT INTO meta VALUES('commits',27);
 INSERT INTO meta VALUES('next_boot_key',6);
 INSERT INTO meta VALUES('next_row',411);
+INSERT INTO meta VALUES('removal_utc_us',1750000013000000);
 INSERT INTO meta VALUES('restored_at_us',1795578959000000);
 INSERT INTO meta VALUES('store_id',-4433749238509973331);
 CREATE TABLE page_session (
@@ -1195,4 +1198,5 @@ FROM command;
 CREATE INDEX run_span_by_boot ON run_span(boot_key);
 CREATE INDEX run_by_robot ON run(robot_id, started_at_us);
 CREATE INDEX command_stop ON command(boot_id, effect_at_robot_us) WHERE kind = 'emergency_stop';
+CREATE INDEX event_of_interruption ON event(boot_key, robot_time_us) WHERE kind = 'experiment_interrupted';
 COMMIT;

@@ -533,3 +533,4 @@ CREATE TABLE rest_owed (              -- robots that move in a name whose right 
   why TEXT NOT NULL,                  -- what has ended the right
   since_us INTEGER NOT NULL
 ) WITHOUT ROWID;
+CREATE INDEX event_of_interruption ON event(boot_key, robot_time_us) WHERE kind = 'experiment_interrupted';

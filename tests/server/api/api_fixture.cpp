@@ -53,10 +53,8 @@ struct ApiTest::Parts {
         robots{test.loop,    test.clock,       test.tasks,
                test.station, test.recorder,    {asio::ip::address_v4::loopback(), 0},
                false,        security.robots()},
-        experiments{{test.loop, test.clock, test.tasks, test.station},
-                    test.recording,
-                    test.maths,
-                    test.config.allow_unattended} {}
+        experiments{
+            {test.loop, test.clock, test.tasks, test.station}, test.recording, test.maths, test.config.experiments} {}
 
   std::unique_ptr<station::ModelSender> models;  // made when the recording has started, like the API
   analysis::AnalysisService analysis;

@@ -112,6 +112,16 @@ TEST_F(FoxgloveSocketTest, AWrongRequestDoesNotUseTheTicketUp) {
   EXPECT_TRUE(open(link)->open());
 }
 
+TEST_F(FoxgloveSocketTest, WithoutATicketNoRobotsNameIsTold) {
+  connect_robot();
+  for (const char* robot : {"r1", "nobody"}) {
+    for (const char* ticket : {"", "&ticket=wrong"}) {
+      const auto page = open(std::string{"/foxglove?robot="} + robot + ticket);
+      EXPECT_TRUE(page->answer.starts_with("HTTP/1.1 401 ")) << page->answer;
+    }
+  }
+}
+
 TEST_F(FoxgloveSocketTest, AClientEndsWithTheCredentialOfWhoMadeItsTicket) {
   const std::string secret = ask("POST", "/api/v1/tokens", {{"name", "eye"}, {"scopes", "read"}}).parsed()["secret"];
   const auto link_of = [&] {

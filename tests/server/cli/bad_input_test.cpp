@@ -45,7 +45,7 @@ TEST_F(BadInput, ModelFiles) {
   EXPECT_THAT(plant(R"({"kp":1e999,"b1":1,"b2":1,"alpha":1.5,"beta":0.5})"), HasSubstr("m.json"));
   EXPECT_THAT(plant(R"({"kp":1,"b1":1,"b2":1,"alpha":2.5,"beta":0.5})"), AllOf(HasSubstr("alpha"), HasSubstr("2.5")));
   EXPECT_THAT(plant(R"({"parameters":{"kp":1}})"), HasSubstr("missing"));
-  EXPECT_THAT(plant(std::string(400'000, '[') + std::string(400'000, ']')), HasSubstr("an array is not a model"));
+  EXPECT_THAT(plant(std::string(400'000, '[') + std::string(400'000, ']')), HasSubstr("more than 64 deep"));
 }
 
 TEST_F(BadInput, ModelFilesMayHaveRemarksAndLackB3) {

@@ -72,6 +72,8 @@ TEST(Redaction, RemovesSecretsInEveryFormAndLeavesWords) {
             "Authorization: [removed]\nCookie: [removed]\nnext");
   EXPECT_EQ(redaction.of("X-Token-Id: abc"), "X-Token-Id: [removed]");
   EXPECT_EQ(redaction.of("psk=hunter2"), "psk=[removed]");
+  EXPECT_EQ(redaction.of("GET /foxglove?robot=r1&ticket=abc"), "GET /foxglove?robot=r1&ticket=[removed]");
+  EXPECT_EQ(redaction.of("GET /login?code=a1 HTTP/1.1"), "GET /login?code=[removed] HTTP/1.1");
   EXPECT_EQ(redaction.of("a -----BEGIN KEY-----\nAAA\n-----END KEY----- b"), "a [removed] b");
   EXPECT_EQ(redaction.of("a -----BEGIN KEY-----\nAAA"), "a [removed]") << "one that was cut";
   EXPECT_THAT(redaction.of("9f86d081884c7d659a2feaa0c55ad015"), Not(HasSubstr("9f86")));

@@ -204,13 +204,25 @@ TEST_F(RunTools, MoreSkippedPeriodsThanTolerableCostTheEndOfTheRunOnly) {
 // The longer part begins under way, where the model is not at rest.
 TEST_F(RunTools, CutAtGapsTakesTheLongestPartThatBeginsAtRest) {
   begin();
-  swim(100, 0.3);
+  swim(300, 0.3);
   robot_.late_us = 600'000;
   swim(200, 0.3);
   flush();
   const ToolAnswer answer = ask("identify --run 1 --cut-at-gaps --structure first_order");
   EXPECT_NE(answer.exit_code, 1) << answer.error;
-  EXPECT_THAT(answer.error, HasSubstr("its longest part without one that begins at rest, from 0.000 to 0.990 s"));
+  EXPECT_THAT(answer.error, HasSubstr("its longest part without one that begins at rest, from 0.000 to 2.990 s"));
+}
+
+TEST_F(RunTools, CutAtGapsFitsNoSmallPartOfARun) {
+  begin();
+  swim(100, 0.3);
+  robot_.late_us = 600'000;
+  swim(200, 0.3);
+  flush();
+  const ToolAnswer answer = ask("identify --run 1 --cut-at-gaps --structure first_order");
+  EXPECT_EQ(answer.exit_code, 1);
+  EXPECT_THAT(answer.error, HasSubstr("of the 3.6 s that were asked for only 1.0 s can be fitted, less than 50 %"));
+  EXPECT_NE(ask("identify --run 1 --to-s 0.99 --structure first_order").exit_code, 1) << "a part that somebody names";
 }
 
 TEST_F(RunTools, CutAtGapsTakesALaterPartAfterARest) {

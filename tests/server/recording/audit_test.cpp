@@ -13,6 +13,7 @@
 #include "server/storage/audit/audit_queries.hpp"
 #include "server/storage/export/run_file.hpp"
 #include "server/storage/query/run_reader.hpp"
+#include "tests/server/captured_log.hpp"
 #include "tests/server/recording/recording_test.hpp"
 
 namespace server {
@@ -345,6 +346,24 @@ TEST_F(AuditTest, TheExportOfARunHoldsItsPartOfTheChainAndNobodyElsesDoings) {
               ElementsAre(HasSubstr(fmt::format("entry {} does not follow on", hidden))));
   exported.exec(fmt::format("UPDATE audit SET actor = 'x' WHERE entry = {}", hidden));
   EXPECT_THAT(storage::check_exported_audit(exported, {}).faults, ElementsAre(HasSubstr("was changed")));
+}
+
+TEST_F(AuditTest, AClockBehindWhatWasRecordedLastIsSaidAtTheStart) {
+  start();
+  ASSERT_TRUE(wait(recorder_->flush_records()));
+  stop();
+  {
+    const CapturedLog log;
+    start();
+    EXPECT_FALSE(log.has("behind what was recorded last"));
+    ASSERT_TRUE(wait(recorder_->flush_records()));
+    stop();
+  }
+  clock_.step_utc(-std::chrono::hours{48});
+  const CapturedLog log;
+  start();
+  EXPECT_TRUE(log.has("is 172")) << log.text();
+  EXPECT_TRUE(log.has("s behind what was recorded last")) << log.text();
 }
 
 }  // namespace

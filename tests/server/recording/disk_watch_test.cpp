@@ -3,6 +3,7 @@
 
 #include <gmock/gmock.h>
 
+#include "tests/server/captured_log.hpp"
 #include "tests/server/recording/recording_test.hpp"
 
 namespace server {
@@ -92,6 +93,19 @@ TEST_F(DiskWatchTest, ADiskThatDoesNotAnswerIsAsItWas) {
   clock_.run_for(6s);
   EXPECT_EQ(watch().state(), storage::SpaceState::critical);
   EXPECT_EQ(watch().use().free_bytes, 100 * kMegabyte);
+}
+
+TEST_F(DiskWatchTest, WarnsEachHourOfAFileSystemThatDamagesAStore) {
+  begin();
+  const CapturedLog log;
+  int asked = 0;
+  watch().set_file_system([&asked](const std::filesystem::path&) {
+    ++asked;
+    return std::string{"NFS"};
+  });
+  clock_.run_for(std::chrono::hours{3} + std::chrono::minutes{1});
+  EXPECT_EQ(asked, 3);
+  EXPECT_THAT(log.text(), HasSubstr("is on NFS, where a store can be damaged"));
 }
 
 }  // namespace

@@ -171,7 +171,8 @@ TEST_F(PurgeTest, CommitsGoInBetween) {
 TEST(SampleAges, KeepANoteForEachHundredthOfTheAge) {
   boost::asio::io_context loop;
   VirtualClock clock{loop};
-  storage::SampleAges ages{clock, microseconds{100h}.count()};
+  const storage::RemovalClock removal{clock};
+  storage::SampleAges ages{removal, microseconds{100h}.count()};
   EXPECT_FALSE(ages.limit().covers(1, 0)) << "nothing is known yet";
   ages.begin(1000);
   EXPECT_FALSE(ages.limit().covers(1000, 0));
@@ -181,6 +182,113 @@ TEST(SampleAges, KeepANoteForEachHundredthOfTheAge) {
     ages.note(1000 + hour);
     EXPECT_EQ(ages.limit().row, hour < 100 ? 0 : 900 + hour) << hour;
   }
+}
+
+// --- the time by which things grow old ---
+
+struct RemovalClockTest : ::testing::Test {
+  RemovalClockTest() { removal.begin({}); }
+  void run(std::chrono::hours for_) {
+    for (auto left = microseconds{for_}; left > 0s; left -= 5min) {
+      clock.skip(5min);
+      removal.look();
+    }
+  }
+  std::int64_t behind_us() const { return clock.utc_us() - removal.utc_us(); }
+
+  boost::asio::io_context loop;
+  VirtualClock clock{loop};
+  storage::RemovalClock removal{clock};
+};
+
+TEST_F(RemovalClockTest, FollowsEveryStepBackAndASmallOneForwardAtTheNextStart) {
+  clock.step_utc(microseconds{-1000h});
+  removal.look();
+  EXPECT_EQ(behind_us(), 0);
+  clock.step_utc(microseconds{20h});
+  removal.look();
+  EXPECT_FALSE(removal.is_doubted());
+  EXPECT_EQ(behind_us(), microseconds{20h}.count()) << "nothing grows old by a clock that is set";
+  storage::RemovalClock next{clock};
+  next.begin(removal.state());
+  EXPECT_EQ(next.utc_us(), clock.utc_us());
+}
+
+TEST_F(RemovalClockTest, WaitsForADayOfRunningAfterAJumpForward) {
+  clock.step_utc(microseconds{8 * 24h});
+  EXPECT_EQ(behind_us(), microseconds{8 * 24h}.count()) << "also before anybody looks";
+  run(23h);
+  EXPECT_TRUE(removal.is_doubted());
+  EXPECT_EQ(behind_us(), microseconds{8 * 24h}.count());
+  run(2h);
+  EXPECT_FALSE(removal.is_doubted());
+  EXPECT_EQ(behind_us(), 0);
+}
+
+TEST_F(RemovalClockTest, AnotherJumpBeginsTheDayAnewAndAWayBackEndsIt) {
+  clock.step_utc(microseconds{8 * 24h});
+  run(23h);
+  clock.step_utc(microseconds{8 * 24h});
+  run(23h);
+  EXPECT_TRUE(removal.is_doubted());
+  clock.step_utc(microseconds{-16 * 24h});
+  run(1h);
+  EXPECT_FALSE(removal.is_doubted());
+  EXPECT_EQ(behind_us(), 0);
+}
+
+TEST_F(RemovalClockTest, ADayOfRunningCountsOverStarts) {
+  clock.step_utc(microseconds{8 * 24h});
+  run(13h);
+  storage::RemovalClock next{clock};
+  next.begin(removal.state());
+  EXPECT_TRUE(next.is_doubted());
+  for (int minutes = 0; minutes < 12 * 60; minutes += 5) {
+    clock.skip(5min);
+    next.look();
+  }
+  EXPECT_FALSE(next.is_doubted());
+}
+
+TEST_F(RemovalClockTest, AnotherWrongClockAfterARestartBeginsTheDayAnew) {
+  clock.step_utc(microseconds{8 * 24h});
+  run(23h);
+  const storage::RemovalClock::State before = removal.state();
+  clock.step_utc(microseconds{3000 * 24h});
+  storage::RemovalClock next{clock};
+  next.begin(before);
+  for (int minutes = 0; minutes < 120; minutes += 5) {
+    clock.skip(5min);
+    next.look();
+  }
+  EXPECT_TRUE(next.is_doubted());
+}
+
+TEST_F(RemovalClockTest, TimeAsleepIsNoRunning) {
+  clock.step_utc(microseconds{8 * 24h});
+  removal.look();
+  clock.skip(30h);
+  removal.look();
+  EXPECT_TRUE(removal.is_doubted());
+}
+
+TEST_F(RemovalClockTest, AClockThatGoesBackToAnotherWrongTimeBeginsTheDayAnew) {
+  clock.step_utc(microseconds{300 * 24h});
+  run(23h);
+  clock.step_utc(microseconds{-280 * 24h});
+  run(2h);
+  EXPECT_TRUE(removal.is_doubted());
+}
+
+TEST_F(RemovalClockTest, AJumpBetweenTwoStartsIsOneToo) {
+  const storage::RemovalClock::State before = removal.state();
+  clock.step_utc(microseconds{8 * 24h});
+  storage::RemovalClock next{clock};
+  next.begin(before);
+  EXPECT_TRUE(next.is_doubted());
+  next.accept();
+  EXPECT_FALSE(next.is_doubted());
+  EXPECT_EQ(next.utc_us(), clock.utc_us());
 }
 
 }  // namespace

@@ -141,7 +141,7 @@ test('a refusal of the station points to its line, and one of a JSON document to
 });
 
 test('progress and situation in words', () => {
-  const progress = { run: 2, runs: 6, step: 1, steps: 2, elapsed_s: 12.9, duration_s: 40 };
+  const progress = { run: 2, runs: 6, step: 1, steps: 2, elapsed_s: 12.9, duration_s: 40, goes_on_in_s: null };
   expect(progress_text({ progress })).toBe('Run 2 of 6, step 1 of 2, 12 of 40 s');
   expect(progress_text({ progress: null })).toBe('');
   expect(situation(experiment(1, { waits_for: 'emergency' })).todo).toMatch(/clear the latch/);

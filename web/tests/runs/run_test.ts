@@ -3,7 +3,7 @@
 import { expect, test } from 'vitest';
 import type { EventRecord } from '../../src/api';
 import { knot_of, Knots } from '../../src/views/runs/knots';
-import { moments_of } from '../../src/views/runs/moments';
+import { interrupted_stretches, interruptions_text, moments_of } from '../../src/views/runs/moments';
 import { completeness_text } from '../../src/views/runs/record';
 import type { Certificate, ImpedanceMap, Marker, Step } from '../../src/views/runs/runs_api';
 import { columns_of } from '../../src/views/runs/impedance';
@@ -65,6 +65,25 @@ test('of a run whose events are out of reach, the steps say what was commanded',
     knots,
   );
   expect(known.length).toBe(1);
+});
+
+test('where the robot waited at rest is shaded, listed, and said with its length', () => {
+  const interrupted = [
+    { span: 0, from_robot_time_us: 500_000, to_robot_time_us: 7_000_000, reason: 'link_lost', detail: '' },
+    { span: 0, from_robot_time_us: 9_000_000, to_robot_time_us: 9_500_000, reason: 'requested', detail: '' },
+  ];
+  const run = { ...made_run(), interrupted };
+  expect(interrupted_stretches(run, 1_000_000, knots)).toEqual([
+    [0.5, 7],
+    [9, 9.5],
+  ]);
+  expect(interrupted_stretches(run, 1_000_000, new Knots(10_000))).toEqual([]);
+  expect(moments_of(run, [], [], [], [1_000_000], knots).map(({ utc_us, text }) => [utc_us, text])).toEqual([
+    [1_500_000, 'interrupted for 6.5 s (link lost)'],
+    [10_000_000, 'interrupted for 0.5 s (requested)'],
+  ]);
+  expect(interruptions_text(run)).toMatch(/^Interrupted 2 times, 7.0 s in all: the robot waited at rest/);
+  expect(interruptions_text(made_run())).toBe('');
 });
 
 test('"nothing lost" is said only when nothing is lost and nothing is missing', () => {

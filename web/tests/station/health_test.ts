@@ -18,6 +18,7 @@ const kRecording: Recording = {
   wal_bytes: 500e3,
   wal_held_s: 0,
   losses: [],
+  clock_is_doubted: false,
   counters: {
     samples_written: 1000,
     samples_duplicate: 0,
@@ -201,6 +202,7 @@ test('silent robots, slow links, refused connections, faults and a wrong clock a
     ),
   ).toBe('caution');
   expect(word('clock', { clock_off_ms: -1500 })).toBe('caution');
+  expect(word('clock', { recording: { ...kRecording, clock_is_doubted: true } })).toBe('caution');
   expect(line('clock', { clock_off_ms: -90_000 }).value).toBe('1 min behind this machine’s');
 });
 

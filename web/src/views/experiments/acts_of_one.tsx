@@ -2,7 +2,7 @@
 
 import type { Acts } from './acts';
 import { may_command } from './acts';
-import { has_ended, is_in_hands_of, type ExperimentSummary } from '../../experiments_store';
+import { counts_down, has_ended, is_in_hands_of, type ExperimentSummary } from '../../experiments_store';
 import type { Session } from '../../session';
 import { who } from './words';
 
@@ -33,10 +33,10 @@ export function ActsOfOne({ session, experiment, acts }: ActsOfOneProps) {
       {text}
     </button>
   );
-  const may_resume = state === 'paused' || (state === 'waiting' && held);
+  const may_resume = (state === 'paused' && !counts_down(experiment)) || (state === 'waiting' && held);
   return (
     <div class="acts">
-      {state === 'running' && (
+      {(state === 'running' || counts_down(experiment)) && (
         <button type="button" id="pause-experiment" disabled={is_busy} onClick={() => ask('pause', experiments.pause)}>
           Pause
         </button>

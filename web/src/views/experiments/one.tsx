@@ -3,7 +3,7 @@
 import { useComputed } from '@preact/signals';
 import { useLayoutEffect, useMemo, useRef } from 'preact/hooks';
 import type { Experiment, ExperimentRun, Prediction } from '../../experiments_api';
-import { has_ended, type ExperimentSummary } from '../../experiments_store';
+import { counts_down, has_ended, is_in_hands_of, type ExperimentSummary } from '../../experiments_store';
 import { millimetres } from '../../format';
 import { format } from '../../route';
 import type { Session } from '../../session';
@@ -140,6 +140,9 @@ function Head({ session, experiment }: { session: Session; experiment: Experimen
         <p class="situation" id="situation">
           {what} {todo !== '' && !is_over && <b>{todo}</b>}
           {own_words && own_words !== experiment.activity && <span class="quiet"> {sentence_of(own_words)}</span>}
+          {counts_down(experiment) && is_in_hands_of(experiment, me, session.store.client.value) && (
+            <b> Any key or press pauses it.</b>
+          )}
           {state === 'waiting' && <WaitsSince experiment={experiment} session={session} />}
         </p>
       )}

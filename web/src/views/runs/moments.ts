@@ -50,6 +50,18 @@ export function moments_of(
     const key = `e${event.boot_id}-${event.event_seq}`;
     found.push({ key, utc_us: utc_us ?? event.received_at_us, kind, text: event_text(event), by: '' });
   }
+  for (const part of run.interrupted) {
+    const boot_id = run.spans[part.span]?.boot_id;
+    const utc_us = boot_id === undefined ? null : knots.utc_of(boot_id, part.from_robot_time_us);
+    if (utc_us === null) continue;
+    found.push({
+      key: `i${part.span}-${part.from_robot_time_us}`,
+      utc_us,
+      kind: 'event',
+      text: waited_text(part),
+      by: '',
+    });
+  }
   // The station lists a robot's newest events only: of an older run its steps say what was commanded in auto mode.
   const knows_commands = of_run.some((event) => kCommanded.includes(event.kind));
   for (const step of knows_commands ? [] : steps) {
@@ -65,6 +77,30 @@ export function moments_of(
     });
   }
   return found.sort((a, b) => a.utc_us - b.utc_us);
+}
+
+type InterruptedPart = Run['interrupted'][number];
+
+const waited_s = (part: InterruptedPart) => (part.to_robot_time_us - part.from_robot_time_us) / 1e6;
+const waited_text = (part: InterruptedPart) => `interrupted for ${waited_s(part).toFixed(1)} s (${words(part.reason)})`;
+
+// Where the robot waited at rest, in seconds since the run's first sample.
+export function interrupted_stretches(run: Run, origin_us: number, knots: Knots): [number, number][] {
+  return run.interrupted.flatMap((part): [number, number][] => {
+    const boot_id = run.spans[part.span]?.boot_id;
+    const utc_us = boot_id === undefined ? null : knots.utc_of(boot_id, part.from_robot_time_us);
+    if (utc_us === null) return [];
+    const from_s = (utc_us - origin_us) / 1e6;
+    return [[from_s, from_s + waited_s(part)]];
+  });
+}
+
+// Of the record: how often and how long it waited; empty: it did not.
+export function interruptions_text({ interrupted }: Pick<Run, 'interrupted'>): string {
+  if (interrupted.length === 0) return '';
+  const all_s = interrupted.reduce((sum, part) => sum + waited_s(part), 0);
+  const times = interrupted.length === 1 ? 'once' : `${interrupted.length} times`;
+  return `Interrupted ${times}, ${all_s.toFixed(1)} s in all: the robot waited at rest (shaded), and a fit leaves that out.`;
 }
 
 function is_in_run({ spans, robot_id }: Run, { robot_id: of, boot_id, sample_seq }: EventRecord): boolean {

@@ -81,6 +81,7 @@ export function RunPlots({ page, route }: { page: RunPage; route: Route }) {
   }, [page]);
   const traces = page.traces.value;
   const moments = page.moments.value;
+  const waits_s = page.waits_s.value;
   const picked_s = page.picked_s.value;
   useEffect(() => {
     if (!traces) return;
@@ -92,11 +93,11 @@ export function RunPlots({ page, route }: { page: RunPage; route: Route }) {
         traces: range_of(traces, columns, ...view),
         bands: strip.has_band ? range_of(traces, ['low_m', 'high_m'], ...view) : null,
       };
-      const is_cut = plot.show(content_of(strip, traces, lines), view, extents, options_of(at));
+      const is_cut = plot.show(content_of(strip, traces, lines, waits_s), view, extents, options_of(at));
       if (strip.has_band) cut.value = is_cut ? band_cut_text(largest_spread_m(traces, ...view)) : '';
     });
     write_cursor(cursor_s.current); // of the values that are drawn now
-  }, [traces, moments, picked_s, is_clock, view[0], view[1]]);
+  }, [traces, moments, waits_s, picked_s, is_clock, view[0], view[1]]);
   useEffect(() => {
     const width_px = hosts.current[0]?.clientWidth ?? 1000;
     void page.look(window, Math.min(2000, Math.max(300, width_px)));

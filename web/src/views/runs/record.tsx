@@ -6,6 +6,7 @@ import { count, date_and_time, duration, fluid_text } from '../../format';
 import { GuardedButton } from '../../parts/hold_button';
 import { OutcomeLine, useAsking } from '../../parts/request';
 import type { Session } from '../../session';
+import { interruptions_text } from './moments';
 import type { RunPage } from './run_page';
 import type { Annotation, Certificate, Run, RunsApi } from './runs_api';
 import { since_text } from './time_axis';
@@ -70,9 +71,11 @@ export function completeness_text(run: Run, certificate: Certificate | null): { 
 
 function Completeness({ run, certificate }: { run: Run; certificate: Certificate | null }) {
   const { tone, text } = completeness_text(run, certificate);
+  const waited = interruptions_text(run);
   return (
     <section aria-label="Record" id="completeness">
       <p class={`completeness ${tone}`}>{text}</p>
+      {waited !== '' && <p id="interruptions">{waited}</p>}
       {certificate && (
         <p class="quiet">
           {certificate.samples_backfilled > 0 && `${count(certificate.samples_backfilled)} were sent again. `}

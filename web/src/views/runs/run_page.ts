@@ -3,7 +3,7 @@
 import { computed, signal } from '@preact/signals';
 import type { EventRecord } from '../../api';
 import { kGapless, Knots, step_bounds_us, wanted_moments } from './knots';
-import { moments_of } from './moments';
+import { interrupted_stretches, moments_of } from './moments';
 import type { Certificate, Marker, Overview, Run, RunMetrics, RunsApi, StoredSample, Window } from './runs_api';
 import { period_us_of, traces_of, type Traces } from './traces';
 
@@ -29,6 +29,11 @@ export class RunPage {
     if (!run) return [];
     const steps = this.metrics.value?.steps ?? [];
     return moments_of(run, this.markers.value, this.events.value, steps, this.span_starts_us, this.knots);
+  });
+  readonly waits_s = computed(() => {
+    const run = this.run.value;
+    void this.traces.value; // knots came with them
+    return run ? interrupted_stretches(run, this.origin_us, this.knots) : [];
   });
   // Of the whole run: where samples are missing, since its first one.
   readonly gaps_s = computed(() => {

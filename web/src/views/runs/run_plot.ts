@@ -26,6 +26,7 @@ export interface PlotContent {
   bands: { low: Values; high: Values; colour: string; alpha?: string }[]; // alpha: two hexadecimal digits
   traces: PlotTrace[];
   gaps_s: [number, number][];
+  waits_s?: [number, number][]; // where the robot waited at rest, interrupted
   lines: PlotLine[];
 }
 
@@ -176,7 +177,12 @@ export class RunPlot {
       hooks: {
         setSelect: [(u) => this.selected(u)],
         setCursor: [(u) => this.options.on_cursor(cursor_at(u))],
-        drawClear: [(u) => this.draw_gaps(u, colour('--gap'))],
+        drawClear: [
+          (u) => {
+            this.shade(u, this.content.waits_s ?? [], colour('--wait'));
+            this.shade(u, this.content.gaps_s, colour('--gap'));
+          },
+        ],
         drawAxes: [(u) => this.draw_lines(u, colour, font)],
         ready: [(u) => this.listen(u)],
       },
@@ -207,10 +213,10 @@ export class RunPlot {
     });
   }
 
-  private draw_gaps(u: uPlot, fill: string): void {
+  private shade(u: uPlot, stretches: [number, number][], fill: string): void {
     const { ctx, bbox } = u;
     ctx.fillStyle = fill;
-    for (const [from, to] of this.content.gaps_s) {
+    for (const [from, to] of stretches) {
       if (to < this.view[0] || from > this.view[1]) continue;
       const left = Math.max(bbox.left, u.valToPos(from, 'x', true));
       const right = Math.min(bbox.left + bbox.width, u.valToPos(to, 'x', true));

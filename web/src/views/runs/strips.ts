@@ -99,13 +99,19 @@ export function lines_of(
   return lines;
 }
 
-export function content_of(strip: Strip, traces: Traces, lines: PlotLine[]): PlotContent {
+export function content_of(
+  strip: Strip,
+  traces: Traces,
+  lines: PlotLine[],
+  waits_s: [number, number][] = [],
+): PlotContent {
   const { time_s, columns, gaps_s } = traces;
   return {
     time_s,
     bands: strip.has_band ? [{ low: columns.low_m, high: columns.high_m, colour: '--spread' }] : [],
     traces: strip.traces.map(({ column, ...look }) => ({ ...look, values: columns[column] })),
     gaps_s,
+    waits_s,
     lines,
   };
 }

@@ -86,7 +86,7 @@ function all_lines(input: HealthInput): HealthLine[] {
     of('Station', 'faults', 'Faults inside', metrics ? faults_line(metrics) : no_figures),
     of('Station', 'connections', 'Connections', metrics ? connections_line(metrics) : no_figures),
     of('Station', 'security', 'Encryption', station ? security_line(station, input.now_ms) : kNotKnown),
-    of('Station', 'clock', 'Clock', clock_line(input.clock_off_ms)),
+    of('Station', 'clock', 'Clock', clock_line(input.clock_off_ms, recording?.clock_is_doubted ?? false)),
   ];
 }
 
@@ -300,7 +300,13 @@ function security_line({ security }: Station, now_ms: number): Line {
   return line('good', value, 'See Certificate.');
 }
 
-function clock_line(off_ms: number | null): Line {
+function clock_line(off_ms: number | null, is_doubted: boolean): Line {
+  if (is_doubted)
+    return line(
+      'caution',
+      'went forward by more than a day',
+      'What its age would remove stays until the clock has stood by that for 24 h of running, or an administrator accepts it (the manual: “A clock that jumps”).',
+    );
   if (off_ms === null) return line('unknown', '', 'Compared with this machine’s when the station has answered.');
   const size = Math.abs(off_ms);
   if (size < kClockOff_ms)
