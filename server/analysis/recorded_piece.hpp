@@ -7,7 +7,9 @@
 #include <string>
 #include <vector>
 
-#include "server/analysis/run_recording.hpp"
+#include "server/analysis/run_window.hpp"
+#include "server/runtime/result.hpp"
+#include "server/storage/samples/stored_sample.hpp"
 
 namespace server::analysis {
 

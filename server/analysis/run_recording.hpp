@@ -1,7 +1,6 @@
 // Turns the samples of a run into a recording for control/: one gapless, equally spaced piece of one boot.
 #pragma once
 
-#include <limits>
 #include <optional>
 #include <span>
 #include <string>
@@ -9,6 +8,7 @@
 
 #include "control/identification/identify.hpp"
 #include "server/analysis/metrics/run_steps.hpp"
+#include "server/analysis/run_window.hpp"
 #include "server/runtime/result.hpp"
 #include "server/storage/runs/outside_reference.hpp"
 #include "server/storage/runs/run.hpp"
@@ -24,15 +24,6 @@ struct RunSamples {
   std::vector<storage::StoredSample> samples;
   std::optional<storage::StoredReference> reference;
   std::vector<storage::InterruptedPart> interrupted;
-};
-
-// Which part of a run: seconds of robot time since the first sample of the span.
-struct RunWindow {
-  std::optional<std::uint32_t> span;  // none: the run's only one
-  double from_s = 0;
-  double to_s = std::numeric_limits<double>::infinity();
-  bool with_velocity = false;  // the robot's own estimate of it, which is no second measurement
-  bool cuts_at_gaps = false;   // the longest part without a gap that begins at rest, and a warning; else a refusal
 };
 
 // From where motion is taken.
