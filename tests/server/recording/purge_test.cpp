@@ -171,7 +171,8 @@ TEST_F(PurgeTest, CommitsGoInBetween) {
 TEST(SampleAges, KeepANoteForEachHundredthOfTheAge) {
   boost::asio::io_context loop;
   VirtualClock clock{loop};
-  const storage::RemovalClock removal{clock};
+  storage::RemovalClock removal{clock};
+  removal.begin({});
   storage::SampleAges ages{removal, microseconds{100h}.count()};
   EXPECT_FALSE(ages.limit().covers(1, 0)) << "nothing is known yet";
   ages.begin(1000);
