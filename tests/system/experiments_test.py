@@ -152,7 +152,10 @@ class ExperimentsTest(unittest.TestCase):
         shown = b""
         while wanted not in shown:
             self.assertTrue(select.select([terminal], [], [], 60)[0], shown)
-            shown += os.read(terminal, 4096)
+            try:
+                shown += os.read(terminal, 4096)
+            except OSError:  # its end
+                self.fail(f"it ended before it said {wanted}: {shown}")
 
     def test_the_pump_of_the_simulator_is_set_by_a_person_and_stored_with_the_run(self):
         with lab() as place:

@@ -152,6 +152,7 @@ json watch(const StationClient& station, std::int64_t id) {
     if (kept.status == kConflict && !std::exchange(was_told, true)) say_whose(kept);
     if (is_ours) seen["stamp_us"] = kept.body.at("stamp_us");
     json experiment = is_ours ? kept.body : ask_experiments(station, "GET", one);
+    const bool is_pressed = keys.pressed().has_value();  // before it is said that it matters
     const bool may_be_paused = is_ours && goes_on_by_itself(experiment);
     progress.show(experiment, may_be_paused && keys.are_read() ? " (any key pauses it)" : "");
     if (is_over(experiment)) {
@@ -159,7 +160,7 @@ json watch(const StationClient& station, std::int64_t id) {
       return is_ours ? ask_experiments(station, "GET", one) : experiment;  // with its runs
     }
     // SAFETY: who presses a key while the robot is about to move again decides that it does not.
-    const bool is_pressed = keys.pressed().has_value(), was_shown = std::exchange(is_shown, may_be_paused);
+    const bool was_shown = std::exchange(is_shown, may_be_paused);
     if (is_pressed && was_shown && may_be_paused) station.ask("POST", one + "/pause", json::object());
     if (!interrupt.comes_within_ms(kWatch_ms)) continue;
     if (is_interrupted || !is_ours) throw std::runtime_error{"interrupted; the experiment is still there"};
