@@ -1,4 +1,4 @@
-// How deep a text in JSON or TOML is nested, told before it is parsed: what reads, copies or destroys a value calls
+// How deep a text in JSON or TOML is nested, found before it is parsed: what reads, copies or destroys a value calls
 // itself once a level, so that the depth of a text is the depth of the stack. Both are linear in the text and call
 // nothing.
 #pragma once

@@ -32,7 +32,7 @@ struct Recording {
   // values out. Empty: none.
   std::vector<bool> is_missed = {};
   // Ticks that were measured and whose values the fit leaves out: the model is simulated through them with their duty.
-  // Of a position with times of its own it is the caller who leaves values out. Empty: none.
+  // Values of a position with times of its own are left out by the caller. Empty: none.
   std::vector<bool> is_left_out = {};
 };
 

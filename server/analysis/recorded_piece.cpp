@@ -9,6 +9,7 @@
 #include <ranges>
 #include <utility>
 
+#include "control/search/fit_statistics.hpp"
 #include "control/search/missed_ticks.hpp"
 
 namespace server::analysis {
@@ -16,7 +17,7 @@ namespace {
 
 constexpr std::size_t kMostWindows = 3;  // in a message
 
-// What is wrong between two neighbours, if anything. Stored times are right to 100 us, so whole periods are asked for
+// A fault between two neighbours, if there is one. Stored times are right to 100 us, so whole periods are asked for
 // within a tenth of one. A few that the robot skipped are missed ticks, and no fault.
 std::optional<std::string> gap_between(const Piece& piece, const storage::StoredSample& before,
                                        const storage::StoredSample& after, double dt_s, double most_skipped) {
@@ -90,10 +91,7 @@ double usual_step_s(const Piece& piece) {
     const storage::StoredSample &before = piece.samples[i - 1], &after = piece.samples[i];
     if (after.seq == before.seq + 1) steps_s.push_back(piece.seconds(after) - piece.seconds(before));
   }
-  if (steps_s.empty()) return 0;
-  const auto middle = steps_s.begin() + static_cast<std::ptrdiff_t>(steps_s.size() / 2);
-  std::ranges::nth_element(steps_s, middle);
-  return *middle;
+  return control::median(std::move(steps_s));
 }
 
 std::vector<std::size_t> ticks_of(const Piece& piece, double dt_s) {

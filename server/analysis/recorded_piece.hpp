@@ -25,6 +25,7 @@ struct Piece {
   double seconds(const storage::StoredSample& stored) const {
     return static_cast<double>(stored.robot_time_us - span_began_us) / 1e6;
   }
+  double length_s() const { return seconds(samples.back()) - seconds(samples.front()); }
 };
 
 // The samples of the window. invalid: there are too few, or several spans to choose from.

@@ -5,10 +5,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
-#include <ranges>
 #include <utility>
 
+#include "control/search/fit_statistics.hpp"
 #include "control/search/missed_ticks.hpp"
 #include "control/sensor/position_weight.hpp"
 #include "server/analysis/motion_at_start.hpp"
@@ -79,9 +78,7 @@ control::Recording as_seen(const control::Recording& recording) {
   const std::vector<double>& time_s = recording.position_time_s;
   std::vector<double> steps_s;
   for (std::size_t i = 1; i < time_s.size(); ++i) steps_s.push_back(time_s[i] - time_s[i - 1]);
-  const auto middle = steps_s.begin() + static_cast<std::ptrdiff_t>(steps_s.size() / 2);
-  std::ranges::nth_element(steps_s, middle);
-  seen.dt_s = *middle;  // what was left out between them does not move it
+  seen.dt_s = control::median(std::move(steps_s));  // what was left out between them does not move it
   seen.position_m = recording.position_m;
   for (const double at_s : time_s) {
     const auto tick = static_cast<std::size_t>(at_s / recording.dt_s);
@@ -173,50 +170,10 @@ const char* text(ChannelChoice value) {
 
 namespace {
 
-Result<RunRecording> recording_in(const RunSamples& run, const RunWindow& window, ChannelChoice choice) {
-  const auto piece = select(run.samples, window);
-  if (!piece) return std::unexpected{piece.error()};
-  const auto& chosen = piece->samples;
-  const double dt_s = usual_step_s(*piece);
-  const double position_sd_m = largest_position_sd_m(*piece);
-  const OutsidePart outside = choice == ChannelChoice::robot ? OutsidePart{} : outside_part(*piece, run);
-  if (choice == ChannelChoice::outside && !outside.is_enough()) {
-    return fail(ErrorCode::invalid, fmt::format("the window has {} positions from outside; at least {} are needed",
-                                                outside.time_s.size(), kFewestPositionsToFit));
-  }
-  const Motion motion = outside.is_enough()                   ? Motion::outside
-                        : storage::is_estimate(position_sd_m) ? Motion::acceleration
-                                                              : Motion::position;
-  const Cut cut{*piece, window, dt_s, motion, control::most_missed_in_a_row(dt_s)};
-  const auto recorded_from = [&](const RunWindow& part, const std::string& why) {
-    auto recorded = recording_in(run, part, choice);
-    if (recorded) recorded->warnings.push_back(fmt::format("{}, from {:.3f} to {:.3f} s", why, part.from_s, part.to_s));
-    return recorded;
-  };
-  if (!cut.is_whole()) {
-    const auto part = window.cuts_at_gaps ? cut.longest(*piece, window) : std::nullopt;
-    if (!part) return cut.refusal(*piece);
-    return recorded_from(*part, "the recording has gaps: fitted is its longest part without one that begins at rest");
-  }
-  const std::vector<std::size_t> ticks = ticks_of(*piece, dt_s);
-  const std::size_t all = ticks.back() + 1, left_out = all - ticks.size();
-  if (!control::may_be_missed(left_out, all)) {
-    const std::string skipped = fmt::format("the robot skipped {} of {} periods, more than {:g} %", left_out, all,
-                                            100 * control::kMostMissedShare);
-    const auto part = with_few_missed(*piece, ticks, window);
-    if (!part) return fail(ErrorCode::invalid, skipped + "; no part of it is long enough", "gap");
-    if (window.cuts_at_gaps) {
-      return recorded_from(*part, skipped + ": fitted is the longest part with fewer that begins at rest");
-    }
-    return fail(ErrorCode::invalid, fmt::format("{}; choose --from-s {} --to-s {}", skipped, part->from_s, part->to_s),
-                "gap");
-  }
-  RunRecording made{{}, channels_reason(position_sd_m), {}};
-  control::Recording& recording = made.recording;
-  recording.dt_s = (piece->seconds(chosen.back()) - piece->seconds(chosen.front())) / static_cast<double>(ticks.back());
-  std::vector<double> recorded_m_s;
-  for (const storage::StoredSample& stored : chosen) {
-    recorded_m_s.push_back(static_cast<double>(stored.sample.velocity_m_s));
+// Its values, one a sample, or of a position from outside as often as that was measured.
+control::Recording values_of(const Piece& piece, const RunWindow& window, Motion motion, const OutsidePart& outside) {
+  control::Recording recording;
+  for (const storage::StoredSample& stored : piece.samples) {
     recording.duty.push_back(static_cast<double>(stored.sample.duty));
     if (motion == Motion::outside) continue;
     if (motion == Motion::acceleration) {
@@ -231,35 +188,86 @@ Result<RunRecording> recording_in(const RunSamples& run, const RunWindow& window
     recording.position_time_s = outside.time_s;
     recording.position_m = outside.position_m;
     recording.position_sd_m = outside.sd_m;
+  }
+  return recording;
+}
+
+// A warning that the robot was not at rest at the beginning, as the model assumes; none: it was.
+std::optional<std::string> under_way(const Piece& piece, Motion motion, const control::Recording& recording) {
+  if (auto driven = driven_before(piece)) return driven;
+  std::vector<double> recorded_m_s;
+  for (const storage::StoredSample& stored : piece.samples) {
+    recorded_m_s.push_back(static_cast<double>(stored.sample.velocity_m_s));
+  }
+  return motion_at_start(motion == Motion::outside ? as_seen(recording) : recording, recorded_m_s);
+}
+
+Result<RunRecording> recording_in(const RunSamples& run, const Piece& piece, const RunWindow& window,
+                                  ChannelChoice choice) {
+  const double dt_s = usual_step_s(piece);
+  const double position_sd_m = largest_position_sd_m(piece);
+  const OutsidePart outside = choice == ChannelChoice::robot ? OutsidePart{} : outside_part(piece, run);
+  if (choice == ChannelChoice::outside && !outside.is_enough()) {
+    return fail(ErrorCode::invalid, fmt::format("the window has {} positions from outside; at least {} are needed",
+                                                outside.time_s.size(), kFewestPositionsToFit));
+  }
+  const Motion motion = outside.is_enough()                   ? Motion::outside
+                        : storage::is_estimate(position_sd_m) ? Motion::acceleration
+                                                              : Motion::position;
+  const Cut cut{piece, window, dt_s, motion, control::most_missed_in_a_row(dt_s)};
+  const auto recorded_from = [&](const RunWindow& part, const std::string& why) {
+    const auto chosen = select(run.samples, part);
+    if (!chosen) return Result<RunRecording>{std::unexpected{chosen.error()}};
+    auto recorded = recording_in(run, *chosen, part, choice);
+    if (recorded) recorded->warnings.push_back(fmt::format("{}, from {:.3f} to {:.3f} s", why, part.from_s, part.to_s));
+    return recorded;
+  };
+  if (!cut.is_whole()) {
+    const auto part = window.cuts_at_gaps ? cut.longest(piece, window) : std::nullopt;
+    if (!part) return cut.refusal(piece);
+    return recorded_from(*part, "the recording has gaps: fitted is its longest part without one that begins at rest");
+  }
+  const std::vector<std::size_t> ticks = ticks_of(piece, dt_s);
+  const std::size_t all = ticks.back() + 1, left_out = all - ticks.size();
+  if (!control::may_be_missed(left_out, all)) {
+    const std::string skipped = fmt::format("the robot skipped {} of {} periods, more than {:g} %", left_out, all,
+                                            100 * control::kMostMissedShare);
+    const auto part = with_few_missed(piece, ticks, window);
+    if (!part) return fail(ErrorCode::invalid, skipped + "; no part of it is long enough", "gap");
+    if (window.cuts_at_gaps) {
+      return recorded_from(*part, skipped + ": fitted is the longest part with fewer that begins at rest");
+    }
+    return fail(ErrorCode::invalid, fmt::format("{}; choose --from-s {} --to-s {}", skipped, part->from_s, part->to_s),
+                "gap");
+  }
+  RunRecording made{values_of(piece, window, motion, outside), channels_reason(position_sd_m), {}};
+  control::Recording& recording = made.recording;
+  recording.dt_s = piece.length_s() / static_cast<double>(ticks.back());
+  if (motion == Motion::outside) {
     made.channels_reason = outside.in_words(*run.reference);
     made.position_sd_m = control::sd_of_mean_weight(outside.sd_m);
   }
   control::place_at_ticks(recording, ticks);
-  recording.is_left_out = interrupted_ticks(*piece, ticks, run);
+  recording.is_left_out = interrupted_ticks(piece, ticks, run);
   if (!recording.is_left_out.empty()) {
     const auto interrupted = static_cast<double>(std::ranges::count(recording.is_left_out, true));
-    made.warnings.push_back(interrupted_in_words(*piece, run, recording.dt_s * interrupted));
+    made.warnings.push_back(interrupted_in_words(piece, run, recording.dt_s * interrupted));
   }
   if (const std::string missed = control::missed_ticks_in_words(recording); !missed.empty()) {
     made.warnings.push_back(missed);
   }
-  if (const auto warning = driven_before(*piece)) {
-    made.warnings.push_back(*warning);
-  } else if (const auto moves =
-                 motion_at_start(motion == Motion::outside ? as_seen(recording) : recording, recorded_m_s)) {
-    made.warnings.push_back(*moves);
-  }
+  if (const auto warning = under_way(piece, motion, recording)) made.warnings.push_back(*warning);
   return made;
 }
 
 }  // namespace
 
 Result<RunRecording> recording_of(const RunSamples& run, const RunWindow& window, ChannelChoice choice) {
-  auto made = recording_in(run, window, choice);
+  const auto piece = select(run.samples, window);
+  if (!piece) return std::unexpected{piece.error()};
+  auto made = recording_in(run, *piece, window, choice);
   if (!made) return made;
-  const auto asked = select(run.samples, window);
-  const double asked_s =
-      asked->seconds(asked->samples.back()) - asked->seconds(asked->samples.front()) - gone_on_s(*asked, run);
+  const double asked_s = piece->length_s() - gone_on_s(*piece, run);
   const std::vector<bool> uncounted = control::uncounted_ticks(made->recording);
   const auto counted = static_cast<double>(std::ssize(made->recording.duty) - std::ranges::count(uncounted, true));
   if (made->recording.dt_s * counted >= kFewestUsable * asked_s) return made;

@@ -16,7 +16,7 @@
 
 #include "base/fields.hpp"
 #include "base/invalid_argument.hpp"
-#include "base/nesting.hpp"
+#include "base/toml_text.hpp"
 #include "base/toml_value.hpp"
 #include "server/config/endpoint.hpp"
 
@@ -48,15 +48,7 @@ std::filesystem::path data_folder_of(const std::string& path) {
 class ConfigFile {
  public:
   ConfigFile(const std::string& text, std::string name) : path_{std::move(name)} {
-    if (base::is_toml_deeper(text, base::kMostTomlDepth)) {
-      base::throw_invalid(path_, ": has tables, keys and lists in each other, more than ", base::kMostTomlDepth,
-                          " deep");
-    }
-    try {
-      table_ = toml::parse(text, path_);
-    } catch (const toml::parse_error& error) {
-      base::throw_invalid(path_, ":", error.source().begin.line, ": ", error.description());
-    }
+    table_ = base::parse_toml(text, path_);
   }
 
   // True when the key is there. T is bool, std::string, std::int64_t or double (which also takes integers).

@@ -1,4 +1,4 @@
-// What the configuration says of experiments.
+// Settings of the configuration for experiments.
 #pragma once
 
 #include <cstdint>

@@ -25,7 +25,7 @@ std::string unsuitable_file_system(const fs::path& folder) {
   std::error_code ignored;
   fs::path there = fs::absolute(folder, ignored);
   while (!fs::exists(there, ignored) && there.has_relative_path()) there = there.parent_path();
-  struct statfs about{};
+  struct statfs about {};
   if (::statfs(there.c_str(), &about) != 0) return {};
   return unsuitable_file_system(static_cast<std::uint64_t>(about.f_type));
 }
@@ -33,8 +33,7 @@ std::string unsuitable_file_system(const fs::path& folder) {
 std::string unsuitable_in_words(const std::string& file_system, const fs::path& folder) {
   return fmt::format(
       "'{}' is on {}, where a store can be damaged and samples be lost: locks, links and syncs do not hold there. "
-      "Choose a "
-      "folder on a local disk (ext4, xfs, btrfs)",
+      "Choose a folder on a local disk (ext4, xfs, btrfs)",
       folder.string(), file_system);
 }
 

@@ -1,4 +1,4 @@
-// How deep a text may be nested: told before it is parsed, and what is not refused needs little stack.
+// How deep a text may be nested: found before it is parsed, and what is not refused needs little stack.
 #include "base/nesting.hpp"
 
 #include <gtest/gtest.h>

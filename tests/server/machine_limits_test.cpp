@@ -1,4 +1,4 @@
-// What a station is told of the machine: limits of the system, and the file system of its folder.
+// Facts of the machine that end a station or damage its store: limits of the system, and the file system of its folder.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <unistd.h>

@@ -102,7 +102,7 @@ class CapsuleTest(unittest.TestCase):
 
             def packed(change, rehash=()):
                 files = change(list(entries))
-                for name in rehash:  # as a stranger does who knows how
+                for name in rehash:  # as somebody does who knows how
                     at = next(i for i, (entry, _) in enumerate(files) if entry.endswith("ro-crate-metadata.json"))
                     crate = json.loads(files[at][1])
                     for one in crate["@graph"]:

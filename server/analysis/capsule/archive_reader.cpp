@@ -68,21 +68,22 @@ Result<std::string> ArchiveReader::read(const std::string& name,
     return server::fail(ErrorCode::invalid, fmt::format("{} is not in the archive", name), "missing");
   }
   if (unzOpenCurrentFile(zip_) != UNZ_OK) return damaged(name);
-  const std::uint64_t most = std::max(kAlwaysAllowed, kMostTimes * std::filesystem::file_size(path_));
+  const std::uint64_t most = std::max(kAlwaysAllowedBytes, kMostExpansion * std::filesystem::file_size(path_));
   PieceHash hash;
   std::string piece(kArchivePieceBytes, '\0');
   int got = 0;
-  while (unpacked_ <= most && (got = unzReadCurrentFile(zip_, piece.data(), static_cast<unsigned>(piece.size()))) > 0) {
+  while (unpacked_bytes_ <= most &&
+         (got = unzReadCurrentFile(zip_, piece.data(), static_cast<unsigned>(piece.size()))) > 0) {
     const std::string part = piece.substr(0, static_cast<std::size_t>(got));
     hash.add(part.data(), part.size());
     take(part);
-    unpacked_ += part.size();
+    unpacked_bytes_ += part.size();
   }
-  if (unpacked_ > most) {
+  if (unpacked_bytes_ > most) {
     unzCloseCurrentFile(zip_);
-    return server::fail(
-        ErrorCode::invalid,
-        fmt::format("what is packed, up to {}, is longer than {} bytes, {} times the archive", name, most, kMostTimes));
+    return server::fail(ErrorCode::invalid,
+                        fmt::format("what is packed, up to {}, is longer than {} bytes, {} times the archive", name,
+                                    most, kMostExpansion));
   }
   const int closed = unzCloseCurrentFile(zip_);
   if (got < 0 || closed != UNZ_OK) return damaged(name);

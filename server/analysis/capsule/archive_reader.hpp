@@ -1,8 +1,8 @@
 // Reads a zip archive: its entries one by one, each hashed, and the seal of archive_writer.hpp.
 //
-// The archive may be anybody's: nothing is written to a path that it names, no two entries may have one name, and no
-// entry may be longer than kMostTimes the file. Errors: what is damaged is in the result of the call; throws
-// std::runtime_error for a file that is no zip archive.
+// The archive may be anybody's: nothing is written to a path that it names, no two entries may have one name, and all
+// that is read of it may be kMostExpansion times as long as the file, or kAlwaysAllowedBytes. Errors: what is damaged
+// is in the result of the call; throws std::runtime_error for a file that is no zip archive.
 #pragma once
 
 #include <cstdint>
@@ -17,9 +17,8 @@ namespace server::analysis {
 
 enum class Seal : std::uint8_t { whole, broken, none };
 
-inline constexpr std::uint64_t kMostTimes = 100;          // what is packed may be longer than its archive
-inline constexpr std::size_t kMostEntries = 1000;         // of one
-inline constexpr std::uint64_t kAlwaysAllowed = 1 << 28;  // bytes
+inline constexpr std::uint64_t kMostExpansion = 100, kAlwaysAllowedBytes = 1 << 28;
+inline constexpr std::size_t kMostEntries = 1000;
 
 class ArchiveReader {
  public:
@@ -29,7 +28,7 @@ class ArchiveReader {
   ArchiveReader& operator=(const ArchiveReader&) = delete;
 
   std::vector<std::string> names();  // in the order of its directory; fewer if that is damaged
-  // Of the names: too many, one twice, one that climbs or is no plain path; empty: nothing.
+  // The first fault of the names: too many, one twice, one that climbs or is no plain path. Empty: there is none.
   std::string fault_of_names();
 
   // The entry in pieces to `take`; then its SHA-256. invalid: it is not there, or damaged.
@@ -42,7 +41,7 @@ class ArchiveReader {
  private:
   std::filesystem::path path_;
   void* zip_ = nullptr;  // of minizip
-  std::uint64_t unpacked_ = 0;
+  std::uint64_t unpacked_bytes_ = 0;
 };
 
 }  // namespace server::analysis

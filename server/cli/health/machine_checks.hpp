@@ -1,4 +1,4 @@
-// What the doctor checks of the machine: disk, file system, clock, real-time priority, limits of the system.
+// Checks of the doctor on the machine: disk, file system, clock, real-time priority, limits of the system.
 //
 // Each measurement is apart from its judgement, so that a test can judge what no test machine has. Times are in the
 // unit of their name. Errors: none; what cannot be measured is a note.

@@ -9,8 +9,8 @@ namespace server::cli {
 
 class Keys {
  public:
-  // Of standard input, if it is a terminal and this program is the one in front of it; else none is ever pressed.
-  explicit Keys(bool is_on = true);
+  // Keys of standard input, if it is a terminal and this program is in front of it; else none is ever pressed.
+  explicit Keys(bool is_on);
   ~Keys();
   Keys(const Keys&) = delete;
   Keys& operator=(const Keys&) = delete;

@@ -1,5 +1,5 @@
 // A database that somebody else may have written: what it is allowed to do while it is read, and whether its schema is
-// one that a version of this program has written. A view or a trigger of a stranger would otherwise run in this
+// one that a version of this program has written. A view or a trigger in it would otherwise run in this
 // program.
 //
 // On the thread that owns the handle. Errors: throws SQLite::Exception.

@@ -44,8 +44,8 @@ void RemovalClock::look() {
   if (!is_doubted_) {
     spdlog::warn(
         "the clock of this computer has gone forward by {:.1f} days: what its age would remove stays until the clock "
-        "has "
-        "stood by that for 24 h of running, or an administrator accepts it (rheonaut's API, recording/clock/accept)",
+        "has stood by that for 24 h of running, or an administrator accepts it (rheonaut's API, "
+        "recording/clock/accept)",
         static_cast<double>(ahead_us) / kUsOfADay);
   }
   is_doubted_ = true;

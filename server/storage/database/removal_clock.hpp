@@ -4,8 +4,8 @@
 // to; backward that is followed at once. A start goes by the computer's clock, unless that is ahead of where time was
 // by more than kDoubtful. What is ahead by more than that, also by being set, is doubted: what would be removed for its
 // age waits until the clock has stood by it for kStandsBy of running, over restarts, or an administrator has said that
-// it is right. A clock that is set again meanwhile, or that is far from where it stood at
-// the last stop, stands by it anew; time in which the computer slept is no running. Limits by space know no age.
+// it is right. A clock that is set again meanwhile, or that is far from where it stood at the last stop, stands by it
+// anew; time in which the computer slept is no running. Limits by space know no age.
 //
 // Loop thread; reading and storing on the disk thread.
 #pragma once

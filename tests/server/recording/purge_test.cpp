@@ -189,10 +189,11 @@ TEST(SampleAges, KeepANoteForEachHundredthOfTheAge) {
 
 struct RemovalClockTest : ::testing::Test {
   RemovalClockTest() { removal.begin({}); }
-  void run(std::chrono::hours for_) {
+  void run(std::chrono::hours for_) { run(removal, for_); }
+  void run(storage::RemovalClock& one, std::chrono::hours for_) {
     for (auto left = microseconds{for_}; left > 0s; left -= 5min) {
       clock.skip(5min);
-      removal.look();
+      one.look();
     }
   }
   std::int64_t behind_us() const { return clock.utc_us() - removal.utc_us(); }
@@ -244,10 +245,7 @@ TEST_F(RemovalClockTest, ADayOfRunningCountsOverStarts) {
   storage::RemovalClock next{clock};
   next.begin(removal.state());
   EXPECT_TRUE(next.is_doubted());
-  for (int minutes = 0; minutes < 12 * 60; minutes += 5) {
-    clock.skip(5min);
-    next.look();
-  }
+  run(next, 12h);
   EXPECT_FALSE(next.is_doubted());
 }
 
@@ -258,10 +256,7 @@ TEST_F(RemovalClockTest, AnotherWrongClockAfterARestartBeginsTheDayAnew) {
   clock.step_utc(microseconds{3000 * 24h});
   storage::RemovalClock next{clock};
   next.begin(before);
-  for (int minutes = 0; minutes < 120; minutes += 5) {
-    clock.skip(5min);
-    next.look();
-  }
+  run(next, 2h);
   EXPECT_TRUE(next.is_doubted());
 }
 

@@ -3,7 +3,7 @@
 import { useSignal } from '@preact/signals';
 import { useEffect, useRef } from 'preact/hooks';
 import { percent } from '../format';
-import { browser_pads, GamepadHold, is_known_layout, kWatch_ms, type Pad } from '../gamepad';
+import { browser_pads, GamepadHold, is_known_layout, kStill_ms, kWatch_ms, type Pad } from '../gamepad';
 import type { Session } from '../session';
 
 interface Props {
@@ -86,7 +86,7 @@ function line_of(hold: GamepadHold, why_not: string): string {
     return `Gamepad: duty ${percent(duty, 0)} %. Let go of the shoulder button to stop.${still}`;
   }
   if (why_not) return `Gamepad: ${why_not}`;
-  if (is_asleep) return 'Gamepad: off, since it said nothing new for 5 s. Move the stick to go on.';
+  if (is_asleep) return `Gamepad: off, since it said nothing new for ${kStill_ms / 1000} s. Move the stick to go on.`;
   if (is_held && duty !== 0) return 'Gamepad: let go of the shoulder button, then hold it again.';
   return 'Gamepad: hold a shoulder button and push the left stick. Its end is the duty above. The right one of its four buttons stops.';
 }
