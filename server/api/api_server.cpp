@@ -55,7 +55,7 @@ ApiServer::ApiServer(boost::asio::io_context& loop, runtime::TaskGroup& tasks, r
     : tasks_{tasks},
       clock_{clock},
       listener_{loop, clock, options.endpoint, options.or_any_port},
-      accounts_{loop, clock, recording.recorder, options.data_dir},
+      accounts_{loop, clock, recording.recorder, recording.removal_clock, options.data_dir},
       auth_{loop, clock, accounts_, options.data_dir, options.store_id},
       logins_{clock, accounts_, options.password_cost},
       guard_{auth_, host_names(options), options.security->http().tls != nullptr},

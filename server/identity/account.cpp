@@ -142,6 +142,7 @@ json to_json(const ApiToken& token) {
           {"made_at_us", token.made_at_us},
           {"last_used_at_us", time_or_null(token.last_used_at_us)},
           {"expires_at_us", time_or_null(token.expires_at_us)},
+          {"expired_at_us", time_or_null(token.expired_at_us)},
           {"revoked_at_us", time_or_null(token.revoked_at_us)}};
 }
 

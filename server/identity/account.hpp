@@ -79,6 +79,7 @@ struct ApiToken {
   std::int64_t last_used_at_us = 0;
   std::int64_t expires_at_us = 0;
   std::int64_t revoked_at_us = 0;
+  std::int64_t expired_at_us = 0;  // when the clock was first seen past expires_at_us; it is refused since
 };
 
 struct PageSession {

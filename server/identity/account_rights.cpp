@@ -25,16 +25,19 @@ asio::awaitable<void> Accounts::watch_rights() {
 }
 
 void Accounts::end_expired() {
-  const std::int64_t now_us = clock_.utc_us();
   for (Token& token : tokens_) {
-    if (token.revoked_at_us != 0) continue;
-    const bool has_expired = token.expires_at_us != 0 && token.expires_at_us <= now_us;
-    const bool has_ended = token.standing->ended();
-    if (!has_expired && has_ended) token.standing = std::make_shared<Standing>(loop_);  // the clock was ahead
-    if (!has_expired || has_ended) continue;
+    const bool has_ended = token.revoked_at_us != 0 || token.standing->ended();
+    if (has_ended || !is_past(token)) continue;
+    if (token.expired_at_us == 0) token.expired_at_us = clock_.utc_us();
     token.standing->end();
     end_right_of("token:" + token.name, fmt::format("token '{}' has expired", token.name));
+    changed_.notify();
   }
+}
+
+// SAFETY: what was seen to have expired does not hold again because the clock is set back.
+bool Accounts::is_past(const ApiToken& token) const {
+  return token.expired_at_us != 0 || (token.expires_at_us != 0 && token.expires_at_us <= clock_.utc_us());
 }
 
 // SAFETY: what a token moves ends when it expires, not up to a second later.
@@ -55,7 +58,7 @@ std::string Accounts::lacks(const std::string& actor, Scope needed) const {
   if (actor.starts_with(kToken) && actor != "token:local") {
     const auto found = std::ranges::find(tokens_, actor.substr(kToken.size()), &Token::name);
     if (found == tokens_.end() || found->revoked_at_us != 0) return actor + " was revoked";
-    if (found->expires_at_us != 0 && found->expires_at_us <= clock_.utc_us()) return actor + " has expired";
+    if (is_past(*found)) return actor + " has expired";
     scopes = found->scopes;
     user = found->owner;
   } else if (actor.starts_with(kUser)) {

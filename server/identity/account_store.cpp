@@ -31,7 +31,7 @@ User read_user(SQLite::Statement& row) {
 }
 
 constexpr const char* kTokenColumns =
-    "name, hash, scopes, owner, made_at_us, last_used_at_us, expires_at_us, revoked_at_us";
+    "name, hash, scopes, owner, made_at_us, last_used_at_us, expires_at_us, revoked_at_us, expired_at_us";
 
 ApiToken read_token(SQLite::Statement& row) {
   return {row.getColumn(0).getString(),
@@ -41,7 +41,8 @@ ApiToken read_token(SQLite::Statement& row) {
           row.getColumn(4).getInt64(),
           row.getColumn(5).getInt64(),
           row.getColumn(6).getInt64(),
-          row.getColumn(7).getInt64()};
+          row.getColumn(7).getInt64(),
+          row.getColumn(8).getInt64()};
 }
 
 PageSession read_session(SQLite::Statement& row) {
@@ -103,6 +104,12 @@ std::optional<User> AccountStore::find_user(const std::string& name) {
   SQLite::Statement query{database_, fmt::format("SELECT {} FROM user WHERE name = ?", kUserColumns)};
   storage::bind_all(query, name);
   return query.executeStep() ? std::optional{read_user(query)} : std::nullopt;
+}
+
+std::optional<ApiToken> AccountStore::find_token(const std::string& name) {
+  SQLite::Statement query{database_, fmt::format("SELECT {} FROM api_token WHERE name = ?", kTokenColumns)};
+  storage::bind_all(query, name);
+  return query.executeStep() ? std::optional{read_token(query)} : std::nullopt;
 }
 
 // In the transaction of the change. An entry about a robot names it, so that it is found with the robot's others.
@@ -180,7 +187,7 @@ Result<void> AccountStore::add_token(const ApiToken& token, const station::Autho
     return fail(ErrorCode::conflict, fmt::format("{} tokens are in use; revoke one first", kMaxTokens), "too_many");
   }
   SQLite::Statement add{database_,
-                        fmt::format("INSERT INTO api_token ({}) VALUES (?, ?, ?, ?, ?, ?, ?, ?)", kTokenColumns)};
+                        fmt::format("INSERT INTO api_token ({}) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)", kTokenColumns)};
   add.bind(1, token.name);
   bind_hash(add, 2, token.hash);
   add.bind(3, text(token.scopes));
@@ -189,6 +196,7 @@ Result<void> AccountStore::add_token(const ApiToken& token, const station::Autho
   add.bind(6, token.last_used_at_us);
   add.bind(7, token.expires_at_us);
   add.bind(8, token.revoked_at_us);
+  add.bind(9, token.expired_at_us);
   add.exec();
   SQLite::Statement forget{database_,
                            "DELETE FROM api_token WHERE name IN (SELECT name FROM api_token WHERE revoked_at_us <> 0"
@@ -204,14 +212,43 @@ Result<ApiToken> AccountStore::revoke_token(const std::string& name, const stati
   SQLite::Transaction transaction{database_, SQLite::TransactionBehavior::IMMEDIATE};
   SQLite::Statement revoke{database_, "UPDATE api_token SET revoked_at_us = ?1 WHERE name = ?2 AND revoked_at_us = 0"};
   const bool was_good = storage::execute(revoke, by.at_us, name) > 0;
-  SQLite::Statement query{database_, fmt::format("SELECT {} FROM api_token WHERE name = ?", kTokenColumns)};
-  storage::bind_all(query, name);
-  if (!query.executeStep()) return unknown("token", name);
-  ApiToken token = read_token(query);
-  query.reset();
+  const std::optional<ApiToken> token = find_token(name);
+  if (!token) return unknown("token", name);
   if (was_good) note(by, "account.token_revoked", name, nlohmann::json::object());
   transaction.commit();
-  return token;
+  return *token;
+}
+
+Result<void> AccountStore::expire_token(const std::string& name, std::int64_t expired_at_us,
+                                        const station::Author& by) {
+  SQLite::Transaction transaction{database_, SQLite::TransactionBehavior::IMMEDIATE};
+  SQLite::Statement expire{database_, "UPDATE api_token SET expired_at_us = ? WHERE name = ? AND expired_at_us = 0"};
+  const bool is_new = storage::execute(expire, expired_at_us, name) > 0;
+  if (is_new) note(by, "account.token_expired", name, {{"expired_at_us", expired_at_us}});
+  transaction.commit();
+  return {};
+}
+
+Result<ApiToken> AccountStore::revive_token(const std::string& name, const station::Author& by) {
+  SQLite::Transaction transaction{database_, SQLite::TransactionBehavior::IMMEDIATE};
+  std::optional<ApiToken> token = find_token(name);
+  if (!token) return unknown("token", name);
+  if (token->revoked_at_us != 0) {
+    return fail(ErrorCode::conflict, fmt::format("token '{}' has ended for good; make a new one", name),
+                "token_has_ended");
+  }
+  if (token->expires_at_us != 0 && token->expires_at_us <= by.at_us) {
+    return fail(
+        ErrorCode::conflict,
+        fmt::format("token '{}' has expired by this computer's clock; make a new one, or set the clock right", name),
+        "token_has_ended");
+  }
+  SQLite::Statement revive{database_, "UPDATE api_token SET expired_at_us = 0 WHERE name = ? AND expired_at_us <> 0"};
+  const bool was_refused = storage::execute(revive, name) > 0;
+  if (was_refused) note(by, "account.token_revived", name, nlohmann::json::object());
+  transaction.commit();
+  token->expired_at_us = 0;
+  return *token;
 }
 
 void AccountStore::replace_sessions(const std::vector<PageSession>& sessions, std::uint64_t next_session,

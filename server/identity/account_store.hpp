@@ -52,6 +52,9 @@ class AccountStore {
   // revoked is forgotten.
   Result<void> add_token(const ApiToken& token, const station::Author& by);
   Result<ApiToken> revoke_token(const std::string& name, const station::Author& by);
+  Result<void> expire_token(const std::string& name, std::int64_t expired_at_us, const station::Author& by);
+  // Of one that has expired by a clock that was wrong. conflict: it was revoked, or has expired by `by.at_us`, too.
+  Result<ApiToken> revive_token(const std::string& name, const station::Author& by);
 
   // Everything that is in `sessions` is stored then, and nothing else; the tokens were last used then.
   void replace_sessions(const std::vector<PageSession>& sessions, std::uint64_t next_session,
@@ -66,6 +69,7 @@ class AccountStore {
 
  private:
   std::optional<User> find_user(const std::string& name);
+  std::optional<ApiToken> find_token(const std::string& name);
   std::optional<Enrolment> find_robot(const std::string& robot_id);
   std::size_t count(const char* sql);
   void note(const station::Author& by, const char* action, const std::string& subject, const nlohmann::json& detail);

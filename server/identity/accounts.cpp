@@ -8,6 +8,7 @@
 
 #include "server/runtime/exceptions.hpp"
 #include "server/storage/database/database.hpp"
+#include "server/storage/database/removal_clock.hpp"
 
 namespace server::identity {
 namespace asio = boost::asio;
@@ -33,17 +34,20 @@ Error not_stored(Error error) {
 }  // namespace
 
 Accounts::Accounts(asio::io_context& loop, runtime::Clock& clock, storage::Recorder& recorder,
-                   const std::filesystem::path& data_dir)
+                   const storage::RemovalClock& removal_clock, const std::filesystem::path& data_dir)
     : loop_{loop},
       clock_{clock},
       recorder_{recorder},
+      removal_clock_{removal_clock},
       old_sessions_file_{data_dir / "rheonaut.sessions"},
       sessions_{loop, clock},
       changed_{loop} {
   SQLite::Database database = storage::open_for_reading(recorder.path());
   const StoredAccounts stored = AccountStore{database}.load();
   for (const User& user : stored.users) users_.emplace(user.name, user);
-  for (const ApiToken& token : stored.tokens) tokens_.push_back({token, std::make_shared<Standing>(loop)});
+  for (const ApiToken& token : stored.tokens) {
+    tokens_.push_back({token, std::make_shared<Standing>(loop), token.expired_at_us != 0});
+  }
   sessions_.load(stored.sessions, stored.next_session);
   if (sessions_.take_over(old_sessions_file_) == 0) {
     std::error_code ignored;
@@ -70,7 +74,7 @@ asio::awaitable<void> Accounts::run() {
   for (;;) {
     sessions_.sweep();
     const bool to_save = sessions_.revision() + token_uses_ != saved_revision_;
-    const bool saved = !to_save || co_await save();
+    const bool saved = co_await store_expired() && (!to_save || co_await save());
     if (saved && sessions_.revision() + token_uses_ != saved_revision_) continue;  // changed meanwhile
     if (saved) {
       co_await changed_.wait_until(clock_, clock_.steady_us() + kSweepInterval.count());
@@ -99,6 +103,28 @@ asio::awaitable<bool> Accounts::save() {
   co_return true;
 }
 
+// That tokens have expired, for the next start; and their end for good, when the clock that said so has proved right.
+asio::awaitable<bool> Accounts::store_expired() {
+  for (Token& token : tokens_) {
+    if (token.expired_at_us == 0 || token.revoked_at_us != 0) continue;
+    const station::Author by{"station", "", clock_.utc_us()};
+    if (!token.is_expiry_stored) {
+      auto job = [name = token.name, at_us = token.expired_at_us, by](AccountStore& store) {
+        return store.expire_token(name, at_us, by);
+      };
+      const auto stored = co_await on_store(std::move(job));
+      if (!stored) co_return false;
+      token.is_expiry_stored = token.expired_at_us != 0;  // unless it was revived meanwhile
+    }
+    const bool is_for_good = token.expired_at_us != 0 &&
+                             removal_clock_.utc_us() - token.expires_at_us >= storage::RemovalClock::kStandsBy.count();
+    if (!is_for_good) continue;
+    const auto revoked = co_await revoke_token(token.name, by);
+    if (!revoked) co_return false;
+  }
+  co_return true;
+}
+
 // A user's role bounds what their pages and tokens may do, at every request anew.
 Caller Accounts::caller(std::string actor, const std::string& user, Scopes scopes,
                         std::shared_ptr<Standing> standing) const {
@@ -112,8 +138,7 @@ Caller Accounts::caller(std::string actor, const std::string& user, Scopes scope
 std::optional<Caller> Accounts::caller_of_token(const std::string& secret) {
   Token* token = runtime::find_secret(tokens_, runtime::hash_of(secret));
   const std::int64_t now_us = clock_.utc_us();
-  if (token == nullptr || token->revoked_at_us != 0) return std::nullopt;
-  if (token->expires_at_us != 0 && token->expires_at_us <= now_us) return std::nullopt;
+  if (token == nullptr || token->revoked_at_us != 0 || is_past(*token)) return std::nullopt;
   Caller found = caller("token:" + token->name, token->owner, token->scopes, token->standing);
   if (found.scopes.empty()) return std::nullopt;
   if (now_us - token->last_used_at_us >= kUseSaveInterval) {
@@ -290,7 +315,7 @@ asio::awaitable<Result<NewToken>> Accounts::add_token(TokenRequest request, stat
   auto job = [token = made.token, by](AccountStore& store) { return store.add_token(token, by); };
   const auto added = co_await on_store(std::move(job));
   if (!added) co_return std::unexpected{added.error()};
-  tokens_.push_back({made.token, std::make_shared<Standing>(loop_)});
+  tokens_.push_back({made.token, std::make_shared<Standing>(loop_), false});
   co_return made;
 }
 
@@ -309,6 +334,17 @@ asio::awaitable<Result<ApiToken>> Accounts::revoke_token(std::string name, stati
   const auto revoked = co_await on_store(std::move(job));
   if (!revoked) co_return std::unexpected{not_stored(revoked.error())};
   co_return revoked;
+}
+
+asio::awaitable<Result<ApiToken>> Accounts::revive_token(std::string name, station::Author by) {
+  auto job = [name, by](AccountStore& store) { return store.revive_token(name, by); };
+  const auto revived = co_await on_store(std::move(job));
+  const auto found = std::ranges::find(tokens_, name, &Token::name);
+  if (!revived || found == tokens_.end() || found->revoked_at_us != 0) co_return revived;  // revoked meanwhile
+  found->expired_at_us = 0;
+  found->is_expiry_stored = false;
+  if (found->standing->ended()) found->standing = std::make_shared<Standing>(loop_);
+  co_return revived;
 }
 
 asio::awaitable<Result<std::vector<Enrolment>>> Accounts::enrolments() {

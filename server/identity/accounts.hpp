@@ -19,6 +19,10 @@
 #include "server/identity/sessions.hpp"
 #include "server/storage/ingest/recorder.hpp"
 
+namespace server::storage {
+class RemovalClock;
+}
+
 namespace server::identity {
 
 inline constexpr std::int64_t kMaxTokenDays = 3650;
@@ -45,7 +49,7 @@ class Accounts {
   // Reads the database, which is open, and takes over the sessions of an older station's `rheonaut.sessions`. Throws
   // when the database cannot be read.
   Accounts(boost::asio::io_context& loop, runtime::Clock& clock, storage::Recorder& recorder,
-           const std::filesystem::path& data_dir);
+           const storage::RemovalClock& removal_clock, const std::filesystem::path& data_dir);
 
   Rights& rights() { return rights_; }
 
@@ -79,6 +83,9 @@ class Accounts {
   std::vector<ApiToken> tokens() const;
   boost::asio::awaitable<Result<NewToken>> add_token(TokenRequest request, station::Author by);
   boost::asio::awaitable<Result<ApiToken>> revoke_token(std::string name, station::Author by);
+  // A token past its time is refused whatever the clock says afterwards, until this; once the clock has stood by that
+  // for a day (RemovalClock) it is revoked.
+  boost::asio::awaitable<Result<ApiToken>> revive_token(std::string name, station::Author by);
 
   boost::asio::awaitable<Result<std::vector<Enrolment>>> enrolments();
   boost::asio::awaitable<Result<NewEnrolment>> enrol(std::string robot_id, station::Author by);
@@ -90,12 +97,15 @@ class Accounts {
  private:
   struct Token : ApiToken {
     std::shared_ptr<Standing> standing;
+    bool is_expiry_stored = false;
   };
 
   Caller caller(std::string actor, const std::string& user, Scopes scopes, std::shared_ptr<Standing> standing) const;
   template <class Job>
   boost::asio::awaitable<std::invoke_result_t<Job, AccountStore&>> on_store(Job job);
   boost::asio::awaitable<bool> save();
+  boost::asio::awaitable<bool> store_expired();
+  bool is_past(const ApiToken& token) const;
   void end_token(Token& token, std::int64_t utc_us);
   void end_expired();
   void end_what_has_no_right() const;
@@ -111,6 +121,7 @@ class Accounts {
   boost::asio::io_context& loop_;
   runtime::Clock& clock_;
   storage::Recorder& recorder_;
+  const storage::RemovalClock& removal_clock_;
   std::filesystem::path old_sessions_file_;
   std::map<std::string, User> users_;
   std::list<Token> tokens_;

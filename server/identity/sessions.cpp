@@ -74,10 +74,18 @@ void Sessions::make_room(const std::string& user) {
 
 const Sessions::Open* Sessions::find(const std::string& secret) {
   Open* session = runtime::find_secret(sessions_, runtime::hash_of(secret));
-  if (session == nullptr || session->ends_at_us <= clock_.utc_us()) return nullptr;
+  if (session == nullptr) return nullptr;
+  if (session->ends_at_us <= clock_.utc_us() && !is_open(*session)) {
+    end(session->number);  // it stays so when the clock is set back
+    return nullptr;
+  }
   renew(*session);
   return session;
 }
+
+// SAFETY: the page that an operator has open is never signed out for want of requests: only we hold the standing of one
+// that nobody has open.
+bool Sessions::is_open(const Open& session) { return session.standing.use_count() > 1; }
 
 void Sessions::renew(Open& session) {
   session.last_used_at_us = clock_.utc_us();
@@ -115,13 +123,11 @@ void Sessions::renew_standing(const std::string& user) {
   }
 }
 
-// SAFETY: the page that an operator has open is never signed out for want of requests: only we hold the standing of one
-// that nobody has open.
 void Sessions::sweep() {
   const std::int64_t now_us = clock_.utc_us();
   for (auto session = sessions_.begin(); session != sessions_.end();) {
     const auto each = session++;
-    if (each->standing.use_count() > 1) renew(*each);
+    if (is_open(*each)) renew(*each);
     if (each->ends_at_us <= now_us) remove(each);
   }
 }

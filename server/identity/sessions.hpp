@@ -42,7 +42,8 @@ class Sessions {
   void sweep();  // forgets what has ended; a page that is open uses its session
 
   const std::list<Open>& all() const { return sessions_; }
-  std::vector<PageSession> rows() const;  // as they are to be stored
+  static bool is_open(const Open& session);  // in a page
+  std::vector<PageSession> rows() const;     // as they are to be stored
   std::uint64_t next_number() const { return next_number_; }
   std::uint64_t revision() const { return revision_; }  // grows with what is worth to be stored
   void on_saved();

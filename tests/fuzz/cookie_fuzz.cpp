@@ -43,7 +43,8 @@ struct Gatehouse {
   storage::Database database{folder / "station.sqlite"};
   runtime::WorkerThread disk{"disk"}, checkpoints{"checkpoints"};
   storage::Recorder recorder{loop, clock, disk, checkpoints, storage::RecorderOptions{folder / "station.sqlite", {}}};
-  identity::Accounts accounts{loop, clock, recorder, folder};
+  const storage::RemovalClock removal_clock{clock};
+  identity::Accounts accounts{loop, clock, recorder, removal_clock, folder};
   identity::Auth auth{loop, clock, accounts, folder, 1};
   http::RequestGuard guard{auth, {"station.lab"}};
   std::string token, session;

@@ -95,7 +95,7 @@ class EndedRightsTest : public ExperimentTest {
     EXPECT_TRUE(wait_for(recording->recorder.on_disk(std::move(write))));
   }
 
-  identity::Accounts accounts{loop, clock, recording->recorder, folder};
+  identity::Accounts accounts{loop, clock, recording->recorder, recording->removal_clock, folder};
   RecordingSink sink;
   storage::ExperimentId experiment = 0;  // the newest; 0: none
 

@@ -181,6 +181,7 @@ export class Api {
   users = async () => (await this.ask<{ users: User[] }>('GET', '/users')).users;
   remove_user = (name: string) => this.ask<object>('POST', `/users/${encodeURIComponent(name)}/remove`);
   tokens = async () => (await this.ask<{ tokens: Token[] }>('GET', '/tokens')).tokens;
+  revive_token = (name: string) => this.ask<Token>('POST', `/tokens/${encodeURIComponent(name)}/revive`);
   revoke_token = (name: string) => this.ask<Token>('POST', `/tokens/${encodeURIComponent(name)}/revoke`);
   sessions = async () => (await this.ask<{ sessions: PageSession[] }>('GET', '/sessions')).sessions;
   revoke_session = (session: number) => this.ask<object>('POST', `/sessions/${session}/revoke`);

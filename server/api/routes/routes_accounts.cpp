@@ -166,6 +166,13 @@ http::Answer revoke_token(AccountRoutes parts, http::Request request) {
   co_return http::json_response(200, to_json(*revoked));
 }
 
+http::Answer revive_token(AccountRoutes parts, http::Request request) {
+  const std::string name = request.param.at("token");
+  const auto revived = co_await parts.accounts.revive_token(name, author_of(request, parts.clock));
+  if (!revived) co_return http::problem(revived.error());
+  co_return http::json_response(200, to_json(*revived));
+}
+
 // ---- sessions of pages
 
 http::Answer list_sessions(AccountRoutes parts, http::Request request) {
@@ -271,6 +278,7 @@ void add_account_routes(http::Router& router, AccountRoutes parts) {
   add("GET", "/api/v1/tokens", identity::Scope::admin, list_tokens);
   add("POST", "/api/v1/tokens", identity::Scope::admin, add_token);
   add("POST", "/api/v1/tokens/{token}/revoke", identity::Scope::admin, revoke_token);
+  add("POST", "/api/v1/tokens/{token}/revive", identity::Scope::admin, revive_token);
   add("GET", "/api/v1/sessions", identity::Scope::admin, list_sessions);
   add("POST", "/api/v1/sessions/{session}/revoke", identity::Scope::admin, revoke_session);
   add("GET", "/api/v1/enrolments", identity::Scope::admin, list_enrolments);

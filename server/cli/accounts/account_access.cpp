@@ -165,6 +165,15 @@ void AccountAccess::revoke_token(const std::string& name) {
   }
 }
 
+void AccountAccess::revive_token(const std::string& name) {
+  value_of(identity::check_name(name));
+  if (station_) {
+    ask("POST", "/tokens/" + name + "/revive");
+  } else {
+    value_of(store().revive_token(name, command_line_author()));
+  }
+}
+
 json AccountAccess::enrolments() {
   return station_ ? ask("GET", "/enrolments").at("enrolments") : list_of(store().enrolments());
 }

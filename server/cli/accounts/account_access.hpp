@@ -31,6 +31,7 @@ class AccountAccess {
   nlohmann::json tokens();
   nlohmann::json add_token(const std::string& name, identity::Scopes scopes, std::int64_t days);  // with its "secret"
   void revoke_token(const std::string& name);
+  void revive_token(const std::string& name);
 
   nlohmann::json enrolments();
   nlohmann::json enrol(const std::string& robot_id);  // with its "secret"

@@ -30,10 +30,13 @@ int list_tokens(const nlohmann::json& tokens, bool as_json, std::ostream& out) {
   for (const auto& token : tokens) {
     const std::string used = time_text(token.at("last_used_at_us"));
     const std::string expires = time_text(token.at("expires_at_us"));
+    const std::string expired = time_text(token.at("expired_at_us"));
     const std::string revoked = time_text(token.at("revoked_at_us"));
-    fmt::print(out, "{:<31}  {}  made {}, used {}{}{}\n", token.at("name").get<std::string>(),
+    fmt::print(out, "{:<31}  {}  made {}, used {}{}{}{}\n", token.at("name").get<std::string>(),
                token.at("scopes").get<std::string>(), time_text(token.at("made_at_us")), used.empty() ? "never" : used,
-               expires.empty() ? "" : ", until " + expires, revoked.empty() ? "" : ", revoked " + revoked);
+               expires.empty() ? "" : ", until " + expires,
+               expired.empty() || !revoked.empty() ? "" : ", refused since " + expired,
+               revoked.empty() ? "" : ", revoked " + revoked);
   }
   return 0;
 }
@@ -69,6 +72,11 @@ void add_options(CLI::App& command, TokenCommand& options) {
       ->add_option("name", options.name, "What it is called")
       ->required()
       ->check(named());
+  offer(command, options, TokenCommand::Act::revive, "revive",
+        "Let a token hold again that a wrong clock has let expire")
+      ->add_option("name", options.name, "What it is called")
+      ->required()
+      ->check(named());
   command.footer("Example: rheonaut token list --data lab");
 }
 
@@ -76,11 +84,13 @@ int run(const TokenCommand& options, std::ostream& out) {
   if (options.act == TokenCommand::Act::create) return create(options, out);
   AccountAccess accounts{options.data_dir, AccountAccess::Missing::refuse};
   if (options.act == TokenCommand::Act::list) return list_tokens(accounts.tokens(), options.json, out);
-  accounts.revoke_token(options.name);
+  const bool is_revived = options.act == TokenCommand::Act::revive;
+  is_revived ? accounts.revive_token(options.name) : accounts.revoke_token(options.name);
+  const char* const result = is_revived ? "holds again" : "was revoked";
   if (options.json) {
-    fmt::print(out, "{}\n", nlohmann::json{{"name", options.name}, {"result", "was revoked"}}.dump(2));
+    fmt::print(out, "{}\n", nlohmann::json{{"name", options.name}, {"result", result}}.dump(2));
   } else {
-    fmt::print(out, "Token {} was revoked\n", options.name);
+    fmt::print(out, "Token {} {}\n", options.name, result);
   }
   return 0;
 }

@@ -13,7 +13,7 @@ class App;
 namespace server::cli {
 
 struct TokenCommand {
-  enum class Act : std::uint8_t { create, list, revoke };
+  enum class Act : std::uint8_t { create, list, revoke, revive };
   Act act = Act::list;
   std::filesystem::path data_dir = "rheonaut-data";
   std::string name;

@@ -266,7 +266,7 @@ CREATE TABLE api_token (
   last_used_at_us INTEGER NOT NULL,     -- to the minute; 0: never
   expires_at_us INTEGER NOT NULL,       -- 0: never
   revoked_at_us INTEGER NOT NULL        -- 0: it is good
-) WITHOUT ROWID;
+, expired_at_us INTEGER NOT NULL DEFAULT 0) WITHOUT ROWID;
 CREATE TABLE page_session (
   session INTEGER PRIMARY KEY,          -- never given twice: meta holds next_session
   hash BLOB NOT NULL UNIQUE,            -- BLAKE2b-256 of the cookie

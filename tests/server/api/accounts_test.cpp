@@ -18,7 +18,9 @@ class AccountsTest : public ApiTest {
     return ask("POST", "/api/v1/tokens", {{"name", name}, {"scopes", of}}).parsed();
   }
   // As after a restart.
-  identity::Accounts stored() { return identity::Accounts{loop, clock, recorder, folder.path()}; }
+  identity::Accounts stored() {
+    return identity::Accounts{loop, clock, recorder, recording.removal_clock, folder.path()};
+  }
   std::string everything_on_disk() const {
     std::string all;
     for (const char* name : {"station.sqlite", "station.sqlite-wal"}) {
@@ -78,6 +80,71 @@ TEST_F(AccountsTest, ATokenIsShownOnceAndStoredAsAHash) {
   EXPECT_EQ(make_token("logger")["status"], 409) << "the record of commands names it";
   EXPECT_EQ(make_token("local")["status"], 422);
   EXPECT_EQ(make_token("other", "root")["status"], 422);
+}
+
+class ExpiredTokenTest : public AccountsTest {
+ protected:
+  ExpiredTokenTest() { clock.settle(); }
+  bool holds() { return accounts().caller_of_token(secret).has_value(); }
+  Answered revive() { return ask("POST", "/api/v1/tokens/logger/revive"); }
+  json listed() { return ask("GET", "/api/v1/tokens").parsed()["tokens"][0]; }
+  void let_expire(microseconds jump) {
+    clock.step_utc(jump);
+    clock.run_for(2s);
+  }
+
+  std::string secret =
+      ask("POST", "/api/v1/tokens", {{"name", "logger"}, {"scopes", "read"}, {"days", 5}}).parsed()["secret"];
+};
+
+// SAFETY: an old credential.
+TEST_F(ExpiredTokenTest, StaysRefusedWhenTheClockGoesBackUntilItIsRevived) {
+  EXPECT_TRUE(holds());
+  let_expire(192h);
+  EXPECT_FALSE(holds());
+  EXPECT_EQ(revive().parsed()["reason"], "token_has_ended") << "the clock says that it has expired";
+  clock.step_utc(-192h);
+  clock.run_for(2s);
+  EXPECT_FALSE(holds());
+  EXPECT_FALSE(stored().caller_of_token(secret)) << "and after a restart";
+  EXPECT_NE(listed()["expired_at_us"], nullptr);
+  EXPECT_EQ(revive().status, 200);
+  EXPECT_TRUE(holds());
+  EXPECT_TRUE(stored().caller_of_token(secret));
+  EXPECT_EQ(listed()["expired_at_us"], nullptr);
+  EXPECT_EQ(ask("POST", "/api/v1/tokens/nothing/revive").status, 404);
+  EXPECT_EQ(ask("POST", "/api/v1/tokens/logger/revoke").status, 200);
+  EXPECT_EQ(revive().status, 409);
+  EXPECT_FALSE(holds());
+}
+
+TEST_F(ExpiredTokenTest, EndsForGoodWhenTheClockHasStoodByItForADay) {
+  const auto run = [this](int hours) {
+    for (int looks = 0; looks < hours * 12; ++looks) {
+      clock.skip(5min);
+      recording.removal_clock.look();
+    }
+    clock.run_for(2min);
+  };
+  let_expire(192h);
+  run(23);
+  EXPECT_EQ(listed()["revoked_at_us"], nullptr);
+  run(2);
+  EXPECT_NE(listed()["revoked_at_us"], nullptr);
+  clock.step_utc(-192h);
+  EXPECT_EQ(revive().status, 409);
+  EXPECT_FALSE(holds());
+  EXPECT_FALSE(stored().caller_of_token(secret));
+}
+
+TEST_F(ExpiredTokenTest, IsKeptAsSuchByADiskThatFailedAWhile) {
+  {
+    const SQLite::Database lock = lock_disk();
+    let_expire(192h);
+    EXPECT_TRUE(stored().tokens().at(0).expired_at_us == 0) << "not stored yet";
+  }
+  clock.run_for(6s);
+  EXPECT_NE(stored().tokens().at(0).expired_at_us, 0);
 }
 
 // SAFETY: what a disk that cannot be written must not do.

@@ -16,9 +16,10 @@ constexpr std::uint64_t kStore = 0xfedcba9876543210;
 
 // Credentials over the database of a station: made again, they are those of a station that was started again.
 struct Credentials {
-  Credentials(boost::asio::io_context& loop, runtime::Clock& clock, storage::Recorder& recorder,
+  Credentials(boost::asio::io_context& loop, runtime::Clock& clock, storage::RecordingParts& recording,
               const std::filesystem::path& folder)
-      : accounts{loop, clock, recorder, folder}, auth{loop, clock, accounts, folder, kStore} {}
+      : accounts{loop, clock, recording.recorder, recording.removal_clock, folder},
+        auth{loop, clock, accounts, folder, kStore} {}
   std::string log_in() { return *auth.log_in(auth.new_login_code(), "127.0.0.1", "a browser"); }
   std::string actor(const std::string& session) {
     const auto caller = auth.caller_of_session(session);
@@ -36,7 +37,7 @@ class AuthTest : public ApiTest {
     clock.settle();
   }
   Credentials* start() {
-    started.push_back(std::make_unique<Credentials>(loop, clock, recorder, home.path()));
+    started.push_back(std::make_unique<Credentials>(loop, clock, recording, home.path()));
     return started.back().get();
   }
   // Lets it store what there is to store, from now on.
@@ -93,7 +94,7 @@ TEST_F(AuthTest, ReplacesWhatIsNoToken) {
 }
 
 TEST_F(AuthTest, SaysWhichFileItCannotWrite) {
-  identity::Accounts accounts{loop, clock, recorder, home.path()};
+  identity::Accounts accounts{loop, clock, recorder, recording.removal_clock, home.path()};
   try {
     const identity::Auth auth{loop, clock, accounts, home.path() / "missing", kStore};
     FAIL();
@@ -160,6 +161,18 @@ TEST_F(AuthTest, CodesAndSessionsEndInTime) {
   const std::string session = station->log_in();
   clock.skip(12h);
   EXPECT_EQ(station->actor(session), "");
+}
+
+TEST_F(AuthTest, ASessionThatHasEndedStaysSoWhenTheClockGoesBack) {
+  auto* const station = start();
+  const std::string closed = station->log_in(), open = station->log_in();
+  const auto page = station->auth.caller_of_session(open);
+  clock.step_utc(192h);
+  EXPECT_EQ(station->actor(closed), "");
+  EXPECT_NE(station->actor(open), "") << "an operator has it open";
+  clock.step_utc(-192h);
+  EXPECT_EQ(station->actor(closed), "");
+  EXPECT_NE(station->actor(open), "");
 }
 
 TEST_F(AuthTest, ASessionInUseIsRenewedAndStoredAtMostOnceAnHour) {

@@ -132,7 +132,8 @@ TEST(HttpServer, ALongAnswerEndsWithTheRightOfWhoAskedForIt) {
   runtime::WorkerThread disk{"disk"}, checkpoints{"checkpoints"};
   storage::Recorder recorder{loop, clock, disk, checkpoints,
                              storage::RecorderOptions{folder.path() / "station.sqlite", {}}};
-  identity::Accounts accounts{loop, clock, recorder, folder.path()};
+  const storage::RemovalClock removal_clock{clock};
+  identity::Accounts accounts{loop, clock, recorder, removal_clock, folder.path()};
   identity::Auth auth{loop, clock, accounts, folder.path(), 1};
   const http::RequestGuard guard{auth, {}};
   http::Router router;

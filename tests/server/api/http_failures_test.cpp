@@ -105,11 +105,13 @@ struct NewCredentials {
   NewCredentials(boost::asio::io_context& loop, runtime::Clock& clock, const std::filesystem::path& folder)
       : database{folder / "station.sqlite"},
         recorder{loop, clock, disk, checkpoints, storage::RecorderOptions{folder / "station.sqlite", {}}},
-        accounts{loop, clock, recorder, folder},
+        removal_clock{clock},
+        accounts{loop, clock, recorder, removal_clock, folder},
         auth{loop, clock, accounts, folder, 1} {}
   storage::Database database;
   runtime::WorkerThread disk{"disk"}, checkpoints{"checkpoints"};
   storage::Recorder recorder;
+  storage::RemovalClock removal_clock;
   identity::Accounts accounts;
   identity::Auth auth;
 };

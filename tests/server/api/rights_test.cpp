@@ -75,7 +75,8 @@ TEST_F(RightsTest, AViewerChangesNothingButMayStop) {
   EXPECT_TRUE(of_admins.contains("POST /api/v1/robots/{robot_id}/retire")) << "the stop of all leaves it out";
   EXPECT_TRUE(of_admins.contains("POST /api/v1/recording/losses/acknowledge"));
   EXPECT_TRUE(of_admins.contains("POST /api/v1/recording/clock/accept")) << "it lets things be removed";
-  EXPECT_EQ(of_admins.size(), 19U);
+  EXPECT_TRUE(of_admins.contains("POST /api/v1/tokens/{token}/revive")) << "it gives a right back";
+  EXPECT_EQ(of_admins.size(), 20U);
 }
 
 // Where the body, or whose it is, decides. (The fixture sees that no 403 is without `needs`.)

@@ -30,6 +30,8 @@ function AllTokens({ context }: { context: Context }) {
   const revoked = tokens.filter((token) => token.revoked_at_us !== null);
   const revoke = (name: string) =>
     void acts.act('revoke', () => session.api.revoke_token(name)).then(() => asked.ask_again());
+  const revive = (name: string) =>
+    void acts.act('revive', () => session.api.revive_token(name)).then(() => asked.ask_again());
   return (
     <div id="station-tokens" class={is_current ? '' : 'was'}>
       <Problem text={asked.problem} />
@@ -50,6 +52,7 @@ function AllTokens({ context }: { context: Context }) {
             context={context}
             is_off={acts.pending.value !== '' || !is_current}
             on_revoke={revoke}
+            on_revive={revive}
           />
         )}
       </Panel>
@@ -68,9 +71,10 @@ interface TableProps {
   context: Context;
   is_off?: boolean;
   on_revoke?: (name: string) => void;
+  on_revive?: (name: string) => void;
 }
 
-function TokenTable({ tokens, context, is_off, on_revoke }: TableProps) {
+function TokenTable({ tokens, context, is_off, on_revoke, on_revive }: TableProps) {
   const { is_utc } = context;
   const now_us = context.session.utc_us();
   return (
@@ -109,6 +113,18 @@ function TokenTable({ tokens, context, is_off, on_revoke }: TableProps) {
                 'never'
               ) : token.expires_at_us < now_us ? (
                 <span class="caution">has run out</span>
+              ) : token.expired_at_us !== null ? (
+                <>
+                  <span class="caution">refused: it had run out by a clock that was ahead</span>{' '}
+                  <button
+                    type="button"
+                    id={`station-revive-${token.name}`}
+                    disabled={is_off ?? false}
+                    onClick={() => on_revive?.(token.name)}
+                  >
+                    Revive<span class="unseen"> {token.name}</span>
+                  </button>
+                </>
               ) : (
                 <When at_us={token.expires_at_us} is_utc={is_utc} />
               )}
