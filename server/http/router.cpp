@@ -95,6 +95,7 @@ std::optional<identity::Scope> Router::scope_lacking(const std::string& method, 
 Answer Router::dispatch(Request request) const {
   if (!request.target.is_acceptable()) co_return problem(400, "the path is not acceptable", "malformed_path");
   request.path = request.target.path();
+  const bool is_of_api = request.target.segments().front() == "api";
   const std::string method = request.method == "HEAD" ? "GET" : request.method;
 
   std::string allowed;
@@ -115,8 +116,8 @@ Answer Router::dispatch(Request request) const {
     }
     if (!route.is_stop) {
       auto parsed = query_of(request.target, route.query);
-      if (!parsed) co_return problem(parsed.error());
-      request.query = std::move(*parsed);
+      if (!parsed && is_of_api) co_return problem(parsed.error());
+      if (parsed) request.query = std::move(*parsed);
     }
     co_return co_await route.answer(std::move(request));
   }
@@ -125,7 +126,7 @@ Answer Router::dispatch(Request request) const {
     response.headers.emplace_back("Allow", allowed);
     co_return response;
   }
-  if (fallback_ && request.target.segments().front() != "api") co_return fallback_(request);
+  if (fallback_ && !is_of_api) co_return fallback_(request);
   co_return problem(404, "there is nothing at this path", "unknown_path");
 }
 

@@ -4,8 +4,9 @@
 //
 // A caller without the route's scope gets 403 before the route sees the request.
 // A path is split at '/', then decoded; a segment with a hidden '/', a control character or ".." is refused with 400,
-// an unknown or repeated query parameter too. An unknown path under /api/ is 404, a known one with another method 405
-// with Allow. HEAD is answered as GET (the server leaves the body out). Every other path goes to the fallback.
+// under /api/ an unknown or repeated query parameter too. An unknown path under /api/ is 404, a known one with another
+// method 405 with Allow. HEAD is answered as GET (the server leaves the body out). Every other path goes to the
+// fallback. Outside /api/ the query is not judged: supervisors and links add parameters of their own.
 // SAFETY: of a request to stop, neither the query nor one slash at the end of the path is judged.
 // Loop thread. Routes are added before the first request and outlive every request.
 #pragma once

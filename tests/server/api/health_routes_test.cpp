@@ -55,6 +55,8 @@ TEST_F(HealthRoutesTest, AliveAndReadyWithoutAToken) {
   EXPECT_TRUE(alive.ends_with("{\"alive\":true}")) << alive;
   EXPECT_THAT(alive, ::testing::HasSubstr("Cache-Control: no-store\r\n"));
   EXPECT_EQ(readiness(), json::parse(R"({"ready": true, "problems": []})"));
+  EXPECT_TRUE(get("/healthz?x=1").ends_with("{\"alive\":true}"));
+  EXPECT_TRUE(get("/readyz?x").starts_with("HTTP/1.1 200 "));
 }
 
 TEST_F(HealthRoutesTest, NotReadyWhileNothingBecomesDurable) {

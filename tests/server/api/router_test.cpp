@@ -22,6 +22,7 @@ class RouterTest : public ::testing::Test {
     router_.add({"GET", "/api/v1/runs", identity::Scope::anyone, {"limit", "after"}, echo});
     router_.add({"POST", "/api/v1/runs", identity::Scope::anyone, {}, echo});
     router_.add({"GET", "/api/v1/runs/{run_id}/samples.csv", identity::Scope::anyone, {}, echo});
+    router_.add({"GET", "/healthz", identity::Scope::anyone, {}, echo});
     router_.set_fallback([](const http::Request& request) {
       http::Response response;
       response.body = "page " + request.path;
@@ -60,6 +61,12 @@ TEST_F(RouterTest, ReadsKnownQueryParametersAndRefusesOthers) {
   EXPECT_EQ(status("/api/v1/runs?limit=1&limit=2"), 400);
   EXPECT_EQ(status("/api/v1/runs?limit=%zz"), 400);
   EXPECT_EQ(status("/api/v1/runs?limit=%0a"), 400);
+}
+
+TEST_F(RouterTest, OutsideTheApiAQueryChangesNothing) {
+  for (const char* target : {"/healthz", "/healthz?x=1", "/healthz?x=1&x=2", "/healthz?%", "/%68ealthz?"}) {
+    EXPECT_EQ(get(target).body, "GET /healthz") << target;
+  }
 }
 
 TEST_F(RouterTest, AnswersUnknownPathsAndMethods) {
