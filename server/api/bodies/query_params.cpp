@@ -100,6 +100,16 @@ Result<std::optional<bool>> query_flag(const http::Request& request, const std::
               "out_of_range");
 }
 
+Result<std::optional<std::string>> query_robot(const http::Request& request) {
+  const auto given = request.query.find("robot_id");
+  if (given == request.query.end()) return std::optional<std::string>{};
+  if (is_robot_id(given->second)) return given->second;
+  return fail(ErrorCode::bad_request,
+              fmt::format("robot_id = '{}' is not 1 to 31 characters of [a-z0-9_-]",
+                          given->second.substr(0, kMaxQuotedParameter)),
+              "out_of_range");
+}
+
 std::string cursor_text(const storage::SampleCursor& cursor) { return fmt::format("{}-{}", cursor.span, cursor.seq); }
 std::string cursor_text(const storage::RecordCursor& cursor) {
   return fmt::format("{}-{}", cursor.at_us, static_cast<std::uint64_t>(cursor.row));

@@ -21,6 +21,9 @@ Result<std::int64_t> query_number(const http::Request& request, const std::strin
 // `true` or `false`; none when it is not given.
 Result<std::optional<bool>> query_flag(const http::Request& request, const std::string& name);
 
+// `robot_id`, of robots that may also be unknown; none when it is not given.
+Result<std::optional<std::string>> query_robot(const http::Request& request);
+
 // Cursors: the `next` of a page, with which the following one is asked for. Of a list of what has a number it is that
 // number; else numbers with '-' between them, opaque to their users: samples "span-seq", events and commands
 // "time-row", markers of a run "span-seq-marker".

@@ -38,6 +38,9 @@ std::optional<std::string> word_of(const http::Request& request, const char* nam
 Result<storage::AuditFilter> filter_of(const http::Request& request) {
   storage::AuditFilter filter;
   filter.robot_id = word_of(request, "robot_id");
+  if (filter.robot_id != "") {  // empty: the station itself
+    if (auto robot = query_robot(request); !robot) return std::unexpected{robot.error()};
+  }
   filter.actor = word_of(request, "actor");
   filter.action = word_of(request, "action");
   const auto window = query_window(request);

@@ -86,10 +86,10 @@ json robots_in(const station::Station& station, const std::string& fluid) {
 }
 
 http::Answer set_model(FluidRoutes parts, http::Request request) {
-  const auto fluid = parts.station.envelope().listed(request.param.at("fluid"));
-  if (!fluid) co_return http::problem(fluid.error());
   auto model = parse_fluid_model(request.body);
   if (!model) co_return http::problem(model.error());
+  const auto fluid = parts.station.envelope().listed(request.param.at("fluid"));
+  if (!fluid) co_return http::problem(fluid.error());
   const auto set = co_await parts.fluid_models.set(*fluid, std::move(*model), author_of(request, parts.clock));
   if (!set) co_return http::problem(set.error());
   co_return http::json_response(

@@ -45,7 +45,7 @@ http::Answer add_marker(MarkerRoutes parts, http::Request request) {
 http::Answer list_markers(MarkerRoutes parts, http::Request request) {
   const std::string robot_id = request.param.at("robot_id");
   if (parts.station.find(robot_id) == nullptr) co_return no_such_robot(robot_id);
-  const auto after = query_number_cursor(request, "after");
+  const auto after = query_number_cursor(request, "after", -1);
   if (!after) co_return http::problem(after.error());
   const auto limit = query_limit(request);
   if (!limit) co_return http::problem(limit.error());

@@ -110,7 +110,9 @@ http::Answer list_reservations(ReservationRoutes parts, http::Request request) {
   storage::ReservationFilter filter;
   filter.before = *before;
   filter.limit = *limit + 1;
-  if (const auto given = request.query.find("robot_id"); given != request.query.end()) filter.robot_id = given->second;
+  auto robot = query_robot(request);
+  if (!robot) co_return http::problem(robot.error());
+  filter.robot_id = std::move(*robot);
   const auto is_over = query_flag(request, "over");
   if (!is_over) co_return http::problem(is_over.error());
   filter.is_over = *is_over;

@@ -28,7 +28,9 @@ http::Answer list_runs(RunRoutes parts, http::Request request) {
   storage::RunFilter filter;
   filter.before = *before;
   filter.limit = *limit + 1;
-  if (const auto given = request.query.find("robot_id"); given != request.query.end()) filter.robot_id = given->second;
+  auto robot = query_robot(request);
+  if (!robot) co_return http::problem(robot.error());
+  filter.robot_id = std::move(*robot);
   if (const auto given = request.query.find("state"); given != request.query.end()) {
     filter.state = storage::run_state_from(given->second);
     if (!filter.state) {
