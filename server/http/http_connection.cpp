@@ -19,7 +19,7 @@ namespace {
 
 constexpr microseconds kWatchInterval{std::chrono::seconds{1}};  // how exactly time-outs are kept
 constexpr std::size_t kReadBytes = 4096;
-constexpr std::size_t kMaxDiscardBytes = 1024 * 1024;
+constexpr std::size_t kMaxDiscardBytes = 32 * 1024 * 1024;  // a client that sends all before it reads
 constexpr const char* kHealth = "/healthz";
 
 Response gave_way() {

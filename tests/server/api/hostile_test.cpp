@@ -135,6 +135,21 @@ TEST_F(HostileTest, OversizedAndDeeplyNestedJsonIsRefused) {
   expect_stops();
 }
 
+TEST_F(HostileTest, WhatFollowsARefusedHeadIsReadTooButNotWithoutEnd) {
+  for (const char* refused :
+       {"hello\r\n", "GET / HTTP/1.1\r\nHost: a\r\nHost: b\r\nContent-Length: 9999999\r\n\r\n", "GET / HTTP/1.1\r\n"}) {
+    RawClient client{clock, port()};
+    std::string fields;
+    while (fields.size() < 10 * 1024 * 1024) fields += "X: 1\r\n";
+    EXPECT_TRUE(client.send(refused + fields)) << refused;
+    EXPECT_TRUE(client.read_until("\r\n").starts_with("HTTP/1.1 4")) << refused;
+  }
+  RawClient endless{clock, port()};
+  endless.send("hello\r\n");
+  EXPECT_FALSE(endless.send(std::string(80 * 1024 * 1024, ' ')));
+  expect_stops();
+}
+
 // The client stays alive and reads nothing: its messages wait within bounds, and then its connection ends.
 TEST_F(HostileTest, APageThatNeverReadsIsLetGo) {
   Page page{clock, port(), "Authorization: Bearer " + token() + "\r\n"};
