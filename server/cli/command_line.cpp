@@ -15,9 +15,11 @@
 #include "base/command_line/help.hpp"
 #include "base/command_line/suggestion.hpp"
 #include "base/version.hpp"
+#include "server/cli/data/limited_child.hpp"
 #include "server/cli/terminal/exit_status.hpp"
 #include "server/cli/terminal/options.hpp"
 #include "server/runtime/log.hpp"
+#include "server/storage/upkeep/restore.hpp"
 
 namespace server::cli {
 namespace {
@@ -229,7 +231,27 @@ std::optional<int> answer(const CommandLine& line, std::ostream& out) {
       line);
 }
 
+namespace {
+
+// What somebody else may have made, of what the command reads.
+std::optional<ForeignFile> foreign_file(const CommandLine& line) {
+  if (const auto* archive = std::get_if<Reproduce>(&line)) return ForeignFile{archive->file, {}};
+  if (const auto* backup = std::get_if<Restore>(&line)) {
+    return ForeignFile{backup->from, storage::restore_draft(backup->data_dir)};
+  }
+  const auto* database = std::get_if<Verify>(&line);
+  if (database != nullptr && database->file) return ForeignFile{*database->file, {}};
+  const auto* reference = std::get_if<ReferenceCommand>(&line);
+  const bool is_import = reference != nullptr && reference->act == ReferenceCommand::Act::import;
+  return is_import ? std::optional{ForeignFile{reference->csv_file, {}}} : std::nullopt;
+}
+
+}  // namespace
+
 std::optional<int> answer(const CommandLine& line) {
+  if (const auto foreign = foreign_file(line)) {
+    if (const auto exit_code = read_in_child(*foreign)) return exit_code;
+  }
   if (!std::holds_alternative<Serve>(line)) runtime::start_log("info");  // on standard error; the other has the answer
   return answer(line, std::cout);
 }

@@ -1,13 +1,16 @@
 """A live station is backed up, the backup restored, and the robot goes on with the restored station."""
 import contextlib
 import fcntl
+import os
 import pathlib
+import resource
+import signal
 import sqlite3
 import subprocess
 import time
 import unittest
 
-from processes import BIN, lab, wait_until
+from processes import BIN, PATIENCE_S, child_of, has_ended, lab, wait_until
 
 
 def tool(*arguments):
@@ -124,6 +127,61 @@ class BackupTest(unittest.TestCase):
                 self.assertEqual(status, 1)
                 self.assertIn("no version of this program wrote its ", error)
                 self.assertFalse((target / "station.sqlite").exists())
+
+    def test_a_restore_that_is_ended_leaves_no_draft(self):
+        """By a limit; by a signal; the next one takes away what is left where both of its processes were killed."""
+        with lab() as place:
+            place.start_station()
+            self.assertEqual(place.stop_station(), 0)
+            copy, target = place.folder / "copy.sqlite", place.folder / "restored"
+            self.assertEqual(tool("backup", "--data", place.data, "--to", copy)[0], 0)
+            command = [str(BIN / "rheonaut"), "restore", "--from", str(copy), "--data", str(target)]
+            limited = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE_S,
+                                     preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000)))
+            self.assertEqual((limited.returncode, limited.stdout), (1, ""))
+            self.assertIn(f"'{copy}' was not read to its end: a file made of it had more than 100000 bytes", limited.stderr)
+            self.assertEqual(list(target.glob("station*")), [])
+            with contextlib.closing(sqlite3.connect(copy, isolation_level=None)) as holder:
+                holder.execute("BEGIN EXCLUSIVE")  # the copy waits for its first page
+                for number in (signal.SIGINT, signal.SIGTERM, signal.SIGKILL):
+                    process = subprocess.Popen(command)
+                    wait_until((target / "station.sqlite.part").exists, PATIENCE_S, "the draft")
+                    reader = child_of(process)
+                    process.send_signal(number)
+                    self.assertEqual(process.wait(timeout=PATIENCE_S), -number)
+                    wait_until(lambda: has_ended(reader), PATIENCE_S, "the end of its child")
+                    self.assertEqual(list(target.glob("station*")), [])
+                process = subprocess.Popen(command, start_new_session=True)
+                wait_until((target / "station.sqlite.part").exists, PATIENCE_S, "the draft")
+                os.killpg(process.pid, signal.SIGKILL)
+                process.wait(timeout=PATIENCE_S)
+            wait_until(lambda: tool(*command[1:])[0] == 0, PATIENCE_S, "the next restore")
+            self.assertEqual([path.name for path in target.glob("station*.part*")], [])
+
+    def test_a_database_of_somebody_else_runs_nothing_when_it_is_verified(self):
+        with lab() as place:
+            place.start_station()
+            self.assertEqual(place.stop_station(), 0)
+            copy = place.folder / "copy.sqlite"
+            self.assertEqual(tool("backup", "--data", place.data, "--to", copy)[0], 0)
+            with contextlib.closing(sqlite3.connect(copy)) as database:
+                database.executescript("ALTER TABLE segment RENAME TO s; CREATE VIEW segment AS WITH RECURSIVE n (i) AS"
+                                       " (SELECT 1 UNION ALL SELECT i + 1 FROM n) SELECT s.* FROM s, n")
+            status, _, error = tool("verify", "--file", copy)
+            self.assertEqual(status, 2, error)
+            self.assertIn("cannot read ", error)
+
+    def test_a_reference_is_imported_by_a_child_under_limits(self):
+        with lab() as place:
+            place.start_station()
+            self.assertEqual(place.stop_station(), 0)
+            file = place.folder / "camera.csv"
+            file.write_text("t_s,position_m\n0,0\n")
+            words = ["reference", "import", "--run", "1", "--csv", str(file), "--data", str(place.data)]
+            ended = subprocess.run([str(BIN / "rheonaut"), *words], capture_output=True, text=True, timeout=PATIENCE_S,
+                                   preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000)))
+            self.assertEqual((ended.returncode, ended.stdout), (1, ""))
+            self.assertIn(f"'{file}' was not read to its end: a file made of it had more than 1000 bytes", ended.stderr)
 
     def test_a_damaged_backup_is_refused(self):
         with lab() as place:

@@ -5,6 +5,8 @@ import hashlib
 import json
 import os
 import pathlib
+import resource
+import signal
 import sqlite3
 import subprocess
 import time
@@ -12,9 +14,11 @@ import unittest
 import warnings
 import zipfile
 
-from processes import BIN, commanded, lab
+from processes import BIN, PATIENCE_S, child_of, commanded, has_ended, lab, wait_until
 
 VALIDATOR = pathlib.Path(__file__).with_name("validate_crate.mjs")
+# A program with the address sanitizer ends, where no memory is left, as any other.
+WITHOUT_MEMORY = {"ASAN_OPTIONS": os.environ.get("ASAN_OPTIONS", "") + ":abort_on_error=1"}
 
 
 class CapsuleTest(unittest.TestCase):
@@ -82,8 +86,37 @@ class CapsuleTest(unittest.TestCase):
             self.assertEqual(found.returncode, 1, found.stderr)
             self.assertIn(f"run-{run}/samples.csv", found.stdout)
 
+    def made_by_hand(self, file, value):
+        """An archive whose documents, of 60 MB, hold this value again and again: read for seconds."""
+        long = b'{"x":[' + b",".join([value] * (60_000_000 // (len(value) + 1))) + b"]}"
+        files = {"run.json": long, "metrics.json": long, "report.html": b"", "samples.sqlite": b""}
+        crate = {"@graph": [{"@type": "File", "@id": name, "sha256": hashlib.sha256(content).hexdigest()}
+                            for name, content in files.items()]}
+        with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
+            for name, content in ({"ro-crate-metadata.json": json.dumps(crate).encode()} | files).items():
+                archive.writestr(f"run-1/{name}", content)
+
+    def test_an_archive_that_takes_too_long_is_ended_and_nothing_is_left_after_a_kill(self):
+        with lab() as place:
+            file, scratch = place.folder / "long.eln", place.folder / "tmp"
+            scratch.mkdir()
+            self.made_by_hand(file, b"1.5")
+            command, into = [str(BIN / "rheonaut"), "reproduce", str(file)], os.environ | {"TMPDIR": str(scratch)}
+            ended = subprocess.run(command, capture_output=True, text=True, timeout=2 * PATIENCE_S, env=into,
+                                   preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_CPU, (1, 5)))
+            self.assertEqual((ended.returncode, ended.stdout), (1, ""))
+            self.assertIn(f"'{file}' was not read to its end: it took more than 1 s of processor time", ended.stderr)
+            self.assertEqual(list(scratch.iterdir()), [])
+            for number in (signal.SIGINT, signal.SIGTERM, signal.SIGKILL):
+                process = subprocess.Popen(command, stdout=subprocess.DEVNULL, env=into)
+                reader = wait_until(lambda: child_of(process), PATIENCE_S, "its child")
+                process.send_signal(number)
+                self.assertEqual(process.wait(timeout=PATIENCE_S), -number)
+                wait_until(lambda: has_ended(reader), PATIENCE_S, "the end of its child")
+                self.assertEqual(list(scratch.iterdir()), [])
+
     def test_a_strangers_archive_ends_in_words_and_leaves_nothing(self):
-        """Two entries of one name, names that climb, a bomb, depth, a database with a view, a fifo, control characters."""
+        """Two entries of one name, names that climb, bombs, depth, a database with a view, a fifo, control characters."""
         with lab() as place:
             station = place.start_station()
             run = self.record(place, station)
@@ -118,6 +151,8 @@ class CapsuleTest(unittest.TestCase):
                 return lambda files: [(entry, content if entry.endswith("/" + name) else old) for entry, old in files]
 
             metrics = next(name for name, _ in entries if name.endswith("metrics.json"))
+            depth, name = 50, "k" * 10_000  # of each of 10,000 numbers the place in the document has 500 kB
+            unfolding = (f'{{"{name}":' * depth + f"[{'1,' * 10_000}1]" + "}" * depth).encode()
             for change, rehash, said in (
                     (lambda files: [*files, (metrics, b"{}")], (), "it has two entries"),
                     (lambda files: [*files, ("../../climbs", b"")], (), "which is no plain path"),
@@ -126,10 +161,11 @@ class CapsuleTest(unittest.TestCase):
                     (lambda files: [*files, *((f"{folder}/{i}", b"") for i in range(1100))], (), "it has more than 1000 entries"),
                     (replaced("samples.sqlite", bytes(400_000_000)), (), "times the archive"),
                     (replaced("metrics.json", b"[" * 200_000), ("metrics.json",), "metrics.json is not a JSON object"),
+                    (replaced("metrics.json", unfolding), ("metrics.json",), "bad.eln' was not read to its end: it needed more than 20"),
                     (replaced("samples.sqlite", forged.read_bytes()), ("samples.sqlite",), "cannot read samples.sqlite")):
                 packed(change, rehash)
                 found = subprocess.run([str(BIN / "rheonaut"), "reproduce", str(bad)], capture_output=True, text=True,
-                                       timeout=60, env=os.environ | {"TMPDIR": str(scratch)})
+                                       timeout=PATIENCE_S, env=os.environ | {"TMPDIR": str(scratch)} | WITHOUT_MEMORY)
                 self.assertIn(found.returncode, (1, 2), found.stdout + found.stderr)
                 self.assertIn(said, found.stdout + found.stderr)
                 self.assertNotIn("\x1b", found.stdout + found.stderr)

@@ -44,6 +44,20 @@ def hurry(process):
         os.sched_setscheduler(process.pid, os.SCHED_RR, os.sched_param(1))
 
 
+def child_of(process):
+    """The number of a process that it has started, as text; none: empty."""
+    with contextlib.suppress(FileNotFoundError):
+        return pathlib.Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().strip()
+
+
+def has_ended(pid):
+    """Also when nobody has asked for its exit status."""
+    try:
+        return not pathlib.Path(f"/proc/{pid}/cmdline").read_bytes()
+    except OSError:
+        return True
+
+
 class Lab:
     """A data folder, and the processes that were started for it; all of them are gone at the end."""
 

@@ -3,6 +3,7 @@
 
 #include <SQLiteCpp/SQLiteCpp.h>
 #include <fmt/format.h>
+#include <sqlite3.h>
 
 #include "server/runtime/exceptions.hpp"
 #include "server/storage/database/foreign_file.hpp"
@@ -28,10 +29,14 @@ Result<CapsuleSamples> read_all(SQLite::Database& database, std::size_t limit) {
 
 }  // namespace
 
-Result<CapsuleSamples> read_capsule_samples(const std::filesystem::path& file, std::size_t limit) {
+Result<CapsuleSamples> read_capsule_samples(std::string& file, std::size_t limit) {
   try {
-    SQLite::Database database{storage::reading_uri(file, true), SQLite::OPEN_READONLY | SQLite::OPEN_URI};
+    SQLite::Database database{":memory:", SQLite::OPEN_READWRITE};
     storage::guard_foreign(database);
+    database.exec("PRAGMA temp_store = MEMORY");
+    auto* const bytes = reinterpret_cast<unsigned char*>(file.data());
+    const auto size = static_cast<sqlite3_int64>(file.size());
+    ::sqlite3_deserialize(database.getHandle(), "main", bytes, size, size, SQLITE_DESERIALIZE_READONLY);
     return read_all(database, limit);
   } catch (const SQLite::Exception& error) {
     return fail(ErrorCode::invalid, fmt::format("cannot read samples.sqlite: {}", runtime::text_of(error)));

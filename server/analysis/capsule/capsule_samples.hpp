@@ -3,8 +3,8 @@
 // Blocks; for command-line tools.
 #pragma once
 
-#include <filesystem>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "server/runtime/result.hpp"
@@ -19,7 +19,8 @@ struct CapsuleSamples {
   std::optional<storage::StoredReference> reference;
 };
 
-// invalid: it is not an export of a run, or has more samples than that.
-Result<CapsuleSamples> read_capsule_samples(const std::filesystem::path& file, std::size_t limit);
+// `file` has the bytes of samples.sqlite: it is read in memory, and nothing of it is left on a disk. invalid: it is not
+// an export of a run, or has more samples than that.
+Result<CapsuleSamples> read_capsule_samples(std::string& file, std::size_t limit);
 
 }  // namespace server::analysis

@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <fstream>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -39,6 +38,7 @@ struct Crate {
   ArchiveReader& archive;
   std::string folder;  // "run-7/"
   json graph;
+  std::string samples = {};  // the bytes of samples.sqlite
 
   Result<std::string> text(const char* name) const { return archive.text(folder + name, kMostDocumentBytes); }
 };
@@ -70,13 +70,11 @@ std::string member_of(const json& entity, const char* name) {
 }
 
 // Samples are kept on the way, for the mathematics.
-void check_file(Crate& crate, const json& entity, const std::filesystem::path& scratch, Reproduction& found) {
+void check_file(Crate& crate, const json& entity, Reproduction& found) {
   const std::string name = member_of(entity, "@id"), expected = member_of(entity, "sha256");
   ++found.files;
-  std::ofstream samples;
-  if (name == kSamplesFile) samples.open(scratch / kSamplesFile, std::ios::binary);
   const auto sum = crate.archive.read(crate.folder + name, [&](const std::string& piece) {
-    if (samples.is_open()) samples << piece;
+    if (name == kSamplesFile) crate.samples += piece;
   });
   if (!sum) {
     found.faults.push_back(sum.error().detail);
@@ -86,7 +84,7 @@ void check_file(Crate& crate, const json& entity, const std::filesystem::path& s
   }
 }
 
-void check_files(Crate& crate, const std::filesystem::path& scratch, Reproduction& found) {
+void check_files(Crate& crate, Reproduction& found) {
   std::set<std::string> described{crate.folder + kCrateFile};
   for (const json& entity : crate.graph) {
     if (member_of(entity, "@type") != "File") continue;
@@ -95,7 +93,7 @@ void check_files(Crate& crate, const std::filesystem::path& scratch, Reproductio
       found.faults.push_back(fmt::format("{} is in the crate's metadata twice", name));
       return;
     }
-    check_file(crate, entity, scratch, found);
+    check_file(crate, entity, found);
     if (found.faults.size() > kMostFaults) return;
   }
   for (const std::string& name : crate.archive.names()) {
@@ -206,13 +204,13 @@ RunMetrics metrics_of(const CapsuleSamples& read, const storage::Run& run) {
   return {run_figures(points, run), measures_of(steps, read.reference)};
 }
 
-Result<void> recompute(const Crate& crate, const std::filesystem::path& scratch, Reproduction& found) {
+Result<void> recompute(Crate& crate, Reproduction& found) {
   const auto run = document_in(crate, kRunFile), metrics = document_in(crate, kMetricsFile);
   if (!run) return std::unexpected{run.error()};
   if (!metrics) return std::unexpected{metrics.error()};
   const auto html = crate.text(kReportFile);
   if (!html) return std::unexpected{html.error()};
-  auto samples = read_capsule_samples(scratch / kSamplesFile, kMostSamples);
+  auto samples = read_capsule_samples(crate.samples, kMostSamples);
   if (!samples) return std::unexpected{samples.error()};
   RunReport report;
   const storage::Run counted = counted_run(*run);
@@ -276,7 +274,7 @@ bool Reproduction::is_reproduced() const {
   return faults.empty() && std::ranges::none_of(results, differs);
 }
 
-Result<Reproduction> reproduce(const std::filesystem::path& archive, const std::filesystem::path& scratch) {
+Result<Reproduction> reproduce(const std::filesystem::path& archive) {
   ArchiveReader reader{archive};
   Reproduction found;
   if (std::string fault = reader.fault_of_names(); !fault.empty()) {
@@ -290,9 +288,9 @@ Result<Reproduction> reproduce(const std::filesystem::path& archive, const std::
     return found;
   }
   read_maker(*crate, found);
-  check_files(*crate, scratch, found);
+  check_files(*crate, found);
   if (!found.faults.empty()) return found;
-  if (const auto done = recompute(*crate, scratch, found); !done) return std::unexpected{done.error()};
+  if (const auto done = recompute(*crate, found); !done) return std::unexpected{done.error()};
   return found;
 }
 

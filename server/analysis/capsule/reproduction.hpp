@@ -36,8 +36,7 @@ struct Reproduction {
   bool is_reproduced() const;
 };
 
-// `scratch` is an empty folder that the caller removes.
-Result<Reproduction> reproduce(const std::filesystem::path& archive, const std::filesystem::path& scratch);
+Result<Reproduction> reproduce(const std::filesystem::path& archive);
 
 // Numbers in two texts, with what stands between them: plots that agree are drawn alike.
 Agreement agreement_of(const std::string& stored, const std::string& recomputed);

@@ -70,14 +70,14 @@ void add_clock_options(CLI::App& sub, ReferenceCommand& options) {
 }
 
 std::string text_of_file(const std::string& file) {
+  if (!fs::is_regular_file(file)) throw std::runtime_error{fmt::format("cannot read '{}': no file", file)};
+  if (const auto bytes = fs::file_size(file); bytes > analysis::kMaxReferenceBytes) {
+    throw std::runtime_error{
+        fmt::format("'{}' has {} bytes, allowed are {}", file, bytes, analysis::kMaxReferenceBytes)};
+  }
   std::ifstream in{file, std::ios::binary};
   if (!in) throw std::runtime_error{fmt::format("cannot read '{}'", file)};
-  std::string text{std::istreambuf_iterator<char>{in}, {}};
-  if (text.size() > analysis::kMaxReferenceBytes) {
-    throw std::runtime_error{
-        fmt::format("'{}' has {} bytes, allowed are {}", file, text.size(), analysis::kMaxReferenceBytes)};
-  }
-  return text;
+  return {std::istreambuf_iterator<char>{in}, {}};
 }
 
 analysis::ReferenceClockRequest clock_of(const ReferenceCommand& options) {
@@ -192,7 +192,8 @@ void write(const ReferenceCommand& options, const storage::OutsideReference& ref
     write_json(out, analysis::json_of(reference));
     return;
   }
-  fmt::print(out, "run {}: {} positions of {}{}\n{}\n{}\n", reference.run, reference.samples, reference.source,
+  fmt::print(out, "run {}: {} positions of {}{}\n{}\n{}\n", reference.run, reference.samples,
+             one_line(reference.source),
              reference.samples_left_out == 0
                  ? std::string{}
                  : fmt::format(", {} before or after the run left out", reference.samples_left_out),
@@ -228,8 +229,8 @@ void remove_one(const ReferenceCommand& options, std::ostream& out) {
 void export_csv(const ReferenceCommand& options, std::ostream& out) {
   const storage::StoredReference stored = read_stored(options, true);
   const storage::OutsidePositions& positions = stored.positions;
-  fmt::print(out, "# {} of run {}, span {}\nrobot_time_us,position_m,position_sd_m\n", stored.reference.source,
-             stored.reference.run, stored.reference.span);
+  fmt::print(out, "# {} of run {}, span {}\nrobot_time_us,position_m,position_sd_m\n",
+             one_line(stored.reference.source), stored.reference.run, stored.reference.span);
   for (std::size_t i = 0; i < positions.size(); ++i) {
     fmt::print(out, "{},{},{}\n", positions.robot_time_us[i], positions.position_m[i], positions.position_sd_m[i]);
   }

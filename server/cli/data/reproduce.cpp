@@ -3,12 +3,10 @@
 
 #include <fmt/format.h>
 #include <fmt/ostream.h>
-#include <stdlib.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdio>
-#include <stdexcept>
 
 #include "base/version.hpp"
 #include "server/analysis/capsule/crate_metadata.hpp"
@@ -24,26 +22,6 @@ using analysis::Reproduction;
 
 constexpr int kNotReproduced = 1;
 constexpr int kNotAnArchive = 2;
-
-// Removed with what is in it.
-class ScratchFolder {
- public:
-  ScratchFolder() {
-    std::string name = (std::filesystem::temp_directory_path() / "rheonaut-reproduce-XXXXXX").string();
-    if (::mkdtemp(name.data()) == nullptr) throw std::runtime_error{fmt::format("cannot make the folder {}", name)};
-    path_ = name;
-  }
-  ~ScratchFolder() {
-    std::error_code ignored;
-    std::filesystem::remove_all(path_, ignored);
-  }
-  ScratchFolder(const ScratchFolder&) = delete;
-  ScratchFolder& operator=(const ScratchFolder&) = delete;
-  const std::filesystem::path& path() const { return path_; }
-
- private:
-  std::filesystem::path path_;
-};
 
 std::size_t count_of(const Reproduction& found, Agreement agreement) {
   return static_cast<std::size_t>(
@@ -105,9 +83,8 @@ void add_options(CLI::App& command, Reproduce& options) {
 }
 
 int run(const Reproduce& options, std::ostream& out) {
-  const ScratchFolder scratch;
   const Progress progress{"reproduce", options.form};
-  const auto found = analysis::reproduce(options.file, scratch.path());
+  const auto found = analysis::reproduce(options.file);
   if (!found) {
     fmt::print(stderr, "rheonaut: {}: {}\n", options.file.string(), one_line(found.error().detail));
     return kNotAnArchive;

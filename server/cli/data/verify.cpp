@@ -12,6 +12,7 @@
 #include "server/cli/terminal/progress.hpp"
 #include "server/runtime/exceptions.hpp"
 #include "server/storage/database/database.hpp"
+#include "server/storage/database/foreign_file.hpp"
 #include "server/storage/database/schema.hpp"
 #include "server/storage/export/run_file.hpp"
 #include "server/storage/query/run_reader.hpp"
@@ -54,6 +55,7 @@ Result<Verified> verify_file(const std::filesystem::path& path, const Verify& op
   Verified verified;
   auto read = [&](SQLite::Database& database, const std::string&) -> Result<void> {
     verified = {};
+    storage::guard_foreign(database);
     const auto version = database.execAndGet("PRAGMA user_version").getInt64();
     if (version < static_cast<std::int64_t>(storage::migrations().size())) {
       return fail(ErrorCode::invalid, fmt::format("{} has schema version {}, which this program cannot verify; a "
@@ -94,6 +96,7 @@ Result<Verified> verify_export(const std::filesystem::path& path, const Verify& 
   }
   try {
     SQLite::Database file = storage::open_for_reading(path);
+    storage::guard_foreign(file);
     if (file.execAndGet("PRAGMA user_version").getInt64() < storage::kRunFileAuditSince) {
       return fail(ErrorCode::invalid,
                   fmt::format("{} was exported by an earlier version: no audit is in it", path.string()));

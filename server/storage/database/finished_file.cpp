@@ -88,7 +88,7 @@ void finish_file(const std::filesystem::path& part, const std::filesystem::path&
 
 void remove_draft(const std::filesystem::path& part) {
   std::error_code ignored;
-  for (const char* suffix : {"", "-journal", "-wal", "-shm"}) {
+  for (const char* suffix : kDraftSuffixes) {
     std::filesystem::remove(std::filesystem::path{part}.concat(suffix), ignored);
   }
 }

@@ -1,6 +1,7 @@
 // A file that others may use becomes visible whole or not at all, and stays after a power cut.
 #pragma once
 
+#include <array>
 #include <filesystem>
 
 namespace server::storage {
@@ -19,7 +20,9 @@ void copy_finished(const std::filesystem::path& from, const std::filesystem::pat
 // Whether the two files hold the same bytes, the second as the disk has it.
 bool holds_the_same(const std::filesystem::path& file, const std::filesystem::path& copy);
 
-// Removes a database that is not complete, with what SQLite has put beside it.
+// Endings of a database that is not complete, and of what SQLite has put beside it.
+inline constexpr std::array kDraftSuffixes{"", "-journal", "-wal", "-shm"};
+// Removes these files.
 void remove_draft(const std::filesystem::path& part);
 
 // The same at the end of a scope, and before: whatever happens, nothing is left of it.

@@ -39,6 +39,7 @@ void guard_foreign(SQLite::Database& database) {
   ::sqlite3_db_config(handle, SQLITE_DBCONFIG_ENABLE_TRIGGER, 0, nullptr);
   ::sqlite3_db_config(handle, SQLITE_DBCONFIG_ENABLE_VIEW, 0, nullptr);
   ::sqlite3_limit(handle, SQLITE_LIMIT_LENGTH, kLongestValue);
+  database.exec("PRAGMA cell_size_check = ON");
 }
 
 std::optional<std::string> strange_in_schema(SQLite::Database& database) {

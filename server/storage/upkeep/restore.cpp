@@ -41,6 +41,7 @@ void check(const fs::path& from, const fs::path& to) {
 
 void copy_database(const fs::path& from, const fs::path& to) {
   SQLite::Database source{from.string(), SQLite::OPEN_READONLY};
+  guard_foreign(source);
   BackupCopy copy{source, to};
   while (!copy.step(BackupCopy::kPagesAtOnce)) continue;
 }
@@ -70,10 +71,12 @@ RestoredStore mark(Database& database, const fs::path& from, const station::Auth
 
 }  // namespace
 
+fs::path restore_draft(const fs::path& folder) { return folder / "station.sqlite.part"; }
+
 RestoredStore restore_database(const fs::path& from, const fs::path& folder, const station::Author& by) {
   const fs::path to = folder / "station.sqlite";
   check(from, to);
-  const Draft draft{folder / "station.sqlite.part"};
+  const Draft draft{restore_draft(folder)};
   RestoredStore restored;
   HeadFile head;
   try {

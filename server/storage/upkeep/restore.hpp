@@ -15,6 +15,9 @@ struct RestoredStore {
   std::int64_t samples = 0;
 };
 
+// The database that is not restored to its end yet.
+std::filesystem::path restore_draft(const std::filesystem::path& folder);
+
 // Copies the database `from` to station.sqlite in the folder: verified, brought to the present schema, with a new
 // store_id, no open run and its own head file (store_head), and visible only when it is whole. Throws
 // std::runtime_error that says why not and what to do: there is a database already, the backup is foreign, newer or

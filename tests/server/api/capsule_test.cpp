@@ -61,16 +61,10 @@ class CapsuleTest : public ApiTest {
     std::ofstream{folder_ / name, std::ios::binary} << bytes;
     return folder_ / name;
   }
-  Result<Reproduction> reproduce(const fs::path& file) {
-    const fs::path scratch = folder_ / "scratch";
-    fs::remove_all(scratch);
-    fs::create_directory(scratch);
-    return analysis::reproduce(file, scratch);
-  }
   // Nothing of a damaged archive is believed.
   std::string fault_of(const fs::path& file) {
     try {
-      const auto found = reproduce(file);
+      const auto found = analysis::reproduce(file);
       if (!found) return found.error().detail;
       return found->faults.empty() ? "" : found->faults.front();
     } catch (const std::runtime_error& error) {
@@ -123,7 +117,7 @@ TEST_F(CapsuleTest, HoldsTheRunAndComesOutAgainBitForBit) {
   EXPECT_EQ(json::parse(texts["run-1/configuration.json"]), ask("GET", "/api/v1/runs/1/snapshot").parsed());
   EXPECT_EQ(texts["run-1/samples.csv"], ask("GET", "/api/v1/runs/1/samples.csv").body);
 
-  const auto found = reproduce(file);
+  const auto found = analysis::reproduce(file);
   ASSERT_TRUE(found) << found.error().detail;
   EXPECT_THAT(found->faults, ElementsAre());
   EXPECT_EQ(found->seal, analysis::Seal::whole);
@@ -197,7 +191,7 @@ TEST_F(CapsuleTest, ANumberThatDoesNotComeOutIsNamed) {
   }
   writer.close();
   while (writer.seal()) continue;
-  const auto found = reproduce(folder_ / "other.eln");
+  const auto found = analysis::reproduce(folder_ / "other.eln");
   ASSERT_TRUE(found) << found.error().detail;
   EXPECT_THAT(found->faults, ElementsAre());
   EXPECT_FALSE(found->is_reproduced());
@@ -221,7 +215,7 @@ TEST_F(CapsuleTest, WhatIsNotInTheMetadataOrNotInTheArchiveIsNamed) {
   }
   writer.close();
   while (writer.seal()) continue;
-  const auto found = reproduce(folder_ / "other.eln");
+  const auto found = analysis::reproduce(folder_ / "other.eln");
   ASSERT_TRUE(found) << found.error().detail;
   EXPECT_THAT(found->faults,
               ElementsAre("run-1/samples.csv is not in the archive", "run-1/more.txt is not in the crate's metadata"));

@@ -1,6 +1,7 @@
 // A position from outside, from the command line without a station: imported, shown, fitted, taken away.
 #include <fmt/format.h>
 #include <gmock/gmock.h>
+#include <sys/stat.h>
 
 #include <cmath>
 #include <random>
@@ -130,6 +131,25 @@ TEST_F(ReferenceTools, PredictSettlesInTheBandOfTheMeasuredStep) {
   ASSERT_EQ(ask("reference import --run 1 --csv @camera.csv --sd-mm 0.5 --offset-s -3.4567 --keep-zero").exit_code, 0);
   const auto json = ask("predict --run 1 --json").json();
   EXPECT_EQ(json["experiment"].value("settling_band_m", 0.0), json["measured_steps"][0]["band_m"]);
+}
+
+TEST_F(ReferenceTools, ImportReadsNoFifoAndNothingThatIsTooLong) {
+  ASSERT_EQ(::mkfifo((folder_ / "fifo.csv").c_str(), 0600), 0);
+  std::ofstream{folder_ / "long.csv"} << "t_s,position_m\n";
+  std::filesystem::resize_file(folder_ / "long.csv", 50'000'000'000);  // a hole
+  const std::string import = "reference import --run 1 --sd-mm 0.5 --csv ";
+  EXPECT_THAT(ask(import + "@fifo.csv").error, HasSubstr("no file"));
+  EXPECT_THAT(ask(import + "@.").error, HasSubstr("no file"));
+  EXPECT_THAT(ask(import + "@long.csv").error, HasSubstr("has 50000000000 bytes, allowed are"));
+}
+
+TEST_F(ReferenceTools, ASourceWithControlCharactersIsShownInOneLine) {
+  ASSERT_EQ(ask("reference import --run 1 --csv @camera.csv --sd-mm 0.5 --offset-s -3.4567").exit_code, 0);
+  SQLite::Database{(folder_ / "station.sqlite").string(), SQLite::OPEN_READWRITE}.exec(
+      "UPDATE outside_reference SET source = 'a' || char(27, 10) || 'b'");
+  for (const char* act : {"show", "export"}) {
+    EXPECT_THAT(ask(fmt::format("reference {} --run 1", act)).text, HasSubstr("a\\x1B\\x0Ab"));
+  }
 }
 
 // The camera saw the first step only.
