@@ -243,6 +243,69 @@ TEST_F(InterruptedTest, WhatIsLeftKeepsWithinTheLimits) {
   EXPECT_LT(robot->simulated().world().position_m(), 0.35);
 }
 
+// A run that may go back to 0 by itself makes room so.
+class WayBackTest : public InterruptedTest {
+ protected:
+  // Interrupted where the rest of it would leave the limits, and on its way back.
+  void go_back() {
+    id = start(profile({"kind = \"duty\"\nduty = 0.3\nfor_s = 10"},
+                       "[conditions]\nstart = \"back\"\n[limits]\nposition_max_m = 0.26\n"));
+    clock.run_for(5s);
+    lose_link(700ms);
+    expect_interrupted(id, "link_lost");
+    from_m = position_m();
+    ASSERT_TRUE(clock.run_until([&] { return position_m() < from_m - 0.02; }, 15s)) << detail();
+    EXPECT_EQ(state().context.mode, rheonaut_MODE_AUTO);
+    EXPECT_EQ(view(id).experiment.state, ExperimentState::running) << "it moves";
+    EXPECT_NE(detail().find("it goes back to 0"), std::string::npos) << detail();
+  }
+  double position_m() const { return robot->simulated().world().position_m(); }
+  std::string detail() { return view(id).experiment.detail; }
+
+  storage::ExperimentId id = 0;
+  double from_m = 0;
+};
+
+TEST_F(WayBackTest, MakesRoomForWhatIsLeft) {
+  go_back();
+  until(id, ExperimentState::done, 90s);
+  double furthest_m = 0;
+  for (const auto& one : samples_of_first_run(id)) furthest_m = std::max(furthest_m, double{one.sample.position_m});
+  EXPECT_LT(furthest_m, 0.26);
+  EXPECT_EQ(begins(id), 1U);
+  const storage::Run run = run_of(id);
+  ASSERT_EQ(run.interrupted.size(), 1U);
+  EXPECT_GT(run.interrupted.front().to_robot_us - run.interrupted.front().from_robot_us, 15'000'000U)
+      << "the way is no part of the line";
+}
+
+TEST_F(WayBackTest, ComesToRestWhenItIsPaused) {
+  go_back();
+  ASSERT_TRUE(wait_for(experiments->pause(id, {"anna", "", 0})));
+  ASSERT_TRUE(clock.run_until([&] { return duty() == 0; }, 1s));
+  clock.run_for(20s);
+  EXPECT_EQ(duty(), 0);
+  EXPECT_EQ(view(id).experiment.state, ExperimentState::paused);
+  ASSERT_TRUE(wait_for(experiments->resume(id, {"anna", "", 0})));
+  until(id, ExperimentState::done, 90s);
+}
+
+TEST_F(WayBackTest, IsInterruptedLikeAStep) {
+  go_back();
+  lose_link(700ms);
+  ASSERT_TRUE(clock.run_until([&] { return duty() == 0 && state().context.mode == rheonaut_MODE_MANUAL; }, 2s));
+  until(id, ExperimentState::done, 90s);
+  EXPECT_EQ(begins(id), 1U);
+}
+
+TEST_F(WayBackTest, EndsWithItsClientsSignsOfLife) {
+  go_back();
+  leave("anna");
+  ASSERT_TRUE(clock.run_until([&] { return state().context.mode == rheonaut_MODE_MANUAL; }, 4s));
+  expect_aborted(id, "nobody_present", 20s);
+  EXPECT_EQ(duty(), 0);
+}
+
 TEST_F(InterruptedTest, AClosedLoopStepBeginsFiveTimes) {
   const auto id = start(profile({"kind = \"setpoint\"\nsetpoint_m = 0.05\nfor_s = 60"}));
   for (int begun = 1; begun < 5; ++begun) {

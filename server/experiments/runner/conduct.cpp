@@ -265,6 +265,8 @@ asio::awaitable<DriveEnd> Conduct::drive(const Profile& profile, TimeLine line) 
   const station::RobotSettings* settings = parts_.driver.station.settings(request.robot_id);
   const auto limit_s = settings == nullptr ? std::nullopt : settings->parameters.value("auto_limit_s");
   if (limit_s) request.auto_limit = microseconds{static_cast<std::int64_t>(static_cast<double>(*limit_s) * 1e6)};
+  const bool may_go_back = profile_.conditions.start == StartPosition::back && !request.is_unattended;
+  if (may_go_back) request.way_back = time_line_of(way_back(), {});
   TravelCheck travel_check = [this, profile](TimeLine rest, double position_m) {
     return check_travel(profile, std::move(rest), position_m);
   };

@@ -30,6 +30,8 @@ inline constexpr microseconds kFluidWithin{3'600'000'000};  // for a person to c
 inline constexpr const char* kOtherController = "other_controller";
 inline constexpr const char* kRightEnded = "right_ended";  // of who it acts for
 
+Profile way_back();  // one setpoint, to 0
+
 // The controller of a name that a profile mentions, for this robot. Errors say what is wrong with the name.
 using ControllerByName =
     std::function<boost::asio::awaitable<Result<protocol::Controller>>(std::string name, station::RobotId robot_id)>;
@@ -66,7 +68,9 @@ class Conduct {
   void on_event(const station::RobotEvent& event);
 
   bool is_aborting() const { return abort_.has_value(); }
-  const Abort* pause_reason() const;     // null: it is not paused
+  // SAFETY: a robot that moves is never called paused, also when it goes back within a pause.
+  bool is_paused() const { return pause_reason() != nullptr && !(driver_ && driver_->goes_back()); }
+  const Abort* pause_reason() const;     // null: it is not paused, and does not go back
   const Conclusion* conclusion() const;  // of one with until that was not aborted: how it ended; else null
   const std::string& activity() const { return activity_; }  // while no run is under way, in words; or empty
   const RunDriver* driver() const { return driver_.get(); }

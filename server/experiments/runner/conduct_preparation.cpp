@@ -18,7 +18,8 @@ namespace {
 
 constexpr microseconds kLook = 200ms, kModelWithin = 30s, kSamplesWithin = 3s, kCommandWithin = 10s;
 
-// One setpoint, back to 0.
+}  // namespace
+
 Profile way_back() {
   Profile profile;
   Step step;
@@ -28,8 +29,6 @@ Profile way_back() {
   profile.steps = {step};
   return profile;
 }
-
-}  // namespace
 
 asio::awaitable<void> Conduct::prepare(Variant variant) {
   co_await await_link();

@@ -275,7 +275,7 @@ asio::awaitable<void> Experiments::keep_if_it_can_be(std::string what, std::func
 storage::ExperimentState Experiments::state_of(const Entry& entry) const {
   if (!entry.conduct || storage::has_ended(entry.experiment.state)) return entry.experiment.state;
   if (entry.conduct->is_aborting()) return ExperimentState::aborting;
-  return entry.conduct->pause_reason() != nullptr ? ExperimentState::paused : ExperimentState::running;
+  return entry.conduct->is_paused() ? ExperimentState::paused : ExperimentState::running;
 }
 
 // What has become of those that run, or was held, as far as the database does not know it; stored aside, since a

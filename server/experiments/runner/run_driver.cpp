@@ -16,8 +16,6 @@ using namespace std::chrono_literals;
 
 namespace {
 
-constexpr microseconds kTurn = 20ms;           // between two looks, if no sample comes
-constexpr microseconds kBeginsAfter = 500ms;   // more than kLookAhead
 constexpr microseconds kWrongModeFor = 400ms;  // telemetry comes later than the time of a command
 constexpr microseconds kShortestStall = 2s;    // of recording; a commit on a busy machine takes less
 constexpr microseconds kLatelyWithin = 3s;     // a standstill of this computer explains what is late now
@@ -130,17 +128,17 @@ std::optional<Abort> RunDriver::unrecorded(const station::RobotState& robot) con
 void RunDriver::watch_mode(const station::RobotState& robot) {
   const std::int64_t now_us = parts_.clock.steady_us();
   const bool lapsed = (robot.context.flags & rheonaut_TELEMETRY_FLAG_LEASE_LAPSED) != 0;
-  if (lapsed && feed_.needs_lease(robot.latest_robot_time_us)) {
+  if (lapsed && feed_now().needs_lease(robot.latest_robot_time_us)) {
     return interrupt({"lease_lapsed", "the lease of the duty was not renewed in time"});
   }
-  if (robot.context.mode == feed_.mode_at(robot.latest_robot_time_us)) {
+  if (robot.context.mode == feed_now().mode_at(robot.latest_robot_time_us)) {
     wrong_mode_since_us_ = 0;
     return;
   }
   if (wrong_mode_since_us_ == 0) wrong_mode_since_us_ = now_us;
   if (now_us - wrong_mode_since_us_ <= kWrongModeFor.count()) return;
   abort({"mode_left", fmt::format("the robot is in the mode {} and was to be in {}", protocol::text(robot.context.mode),
-                                  protocol::text(feed_.mode_at(robot.latest_robot_time_us)))});
+                                  protocol::text(feed_now().mode_at(robot.latest_robot_time_us)))});
 }
 
 // SAFETY: nobody's motor runs while they are away, and nobody's but that of who is in control.
@@ -162,7 +160,7 @@ void RunDriver::watch_actor(const station::RobotState& robot) {
         {"nobody_present", fmt::format("{} has given no sign of life for {} s", request_.actor, kAbsence / 1s)});
   }
   const std::uint64_t robot_us = robot_now_us(robot);
-  const bool is_driving = feed_.needs_lease(robot_us) || feed_.is_about_to_drive(robot_us);
+  const bool is_driving = feed_now().needs_lease(robot_us) || feed_now().is_about_to_drive(robot_us);
   if (!is_driving || is_fresh()) return;
   interrupt({"nobody_present", fmt::format("{} gives no sign of life", request_.actor)});
 }
@@ -242,10 +240,11 @@ void RunDriver::abort(Abort why) {
 // --- what is sent ---
 
 void RunDriver::feed(const station::RobotState& robot) {
+  CommandFeed& feed = way_feed_ ? *way_feed_ : feed_;
   const std::uint64_t now_us = robot_now_us(robot);
   // What comes after a change of mode is sent once telemetry shows it.
-  if (robot.context.mode != feed_.mode_at(now_us)) return;
-  while (auto fed = feed_.next(now_us)) {
+  if (robot.context.mode != feed.mode_at(now_us)) return;
+  while (auto fed = feed.next(now_us)) {
     spawn(send(std::move(*fed), now_us));
   }
 }

@@ -8,9 +8,10 @@
 //
 // Interrupted: the link, a command, samples or a sign of life was late. The robot is at rest, and the run goes on when
 // the same boot is back within `back_within`, was seen at rest since then, its client has given a sign of life since
-// that, and kCountDown has passed; a pause by a person ends that. A duty goes on at the tick where it was broken off,
-// closed-loop steps begin again; what is left must keep within the limits from where the robot is. Not of an unattended
-// one, and never after a stop, a latch, a limit, a taken control or another boot.
+// that, and kCountDown has passed; a pause by a person ends that. Where what is left would pass a limit from there, the
+// robot goes back to 0 first, if the profile lets it (`way_back`), under the same conditions. A duty goes on at the
+// tick where it was broken off, closed-loop steps begin again; what is left must keep within the limits from where the
+// robot is. Not of an unattended one, and never after a stop, a latch, a limit, a taken control or another boot.
 //
 // The owner passes the station's reports on. Loop thread; what it is given outlives it, and so does it its own tasks:
 // run() has returned, or the loop has ended.
@@ -59,6 +60,7 @@ struct DriveRequest {
   std::string peer;                      // "experiment:7", by which its own commands are known
   bool is_unattended = false;            // SAFETY: of a line in auto alone
   microseconds auto_limit{600'000'000};  // longest time without a sign of life, if unattended
+  std::optional<TimeLine> way_back{};  // to 0, in closed loop: by it an interrupted run may make room for what is left
 };
 
 struct DriveEnd {
@@ -103,7 +105,7 @@ class RunDriver {
   // After run() has thrown: returns when no task of its own is left.
   boost::asio::awaitable<void> settle_tasks();
 
-  bool is_paused() const { return pause_.has_value(); }
+  bool goes_back() const { return way_feed_.has_value(); }  // it moves, within its pause
   const Abort* pause_reason() const { return pause_ ? &pause_->shown : nullptr; }
   // By a person, or until one comes.
   const Abort* held_by() const { return pause_ && !pause_->ends_by_itself ? &pause_->why : nullptr; }
@@ -114,7 +116,8 @@ class RunDriver {
   const std::vector<StepBegin>& step_begins() const { return begins_; }
 
  private:
-  static constexpr microseconds kTurn{20'000};  // between two looks, if no sample comes
+  static constexpr microseconds kTurn{20'000};          // between two looks, if no sample comes
+  static constexpr microseconds kBeginsAfter{500'000};  // more than kLookAhead
 
   struct Pause {
     Pause(Abort of, std::int64_t now_us, bool by_itself = false)
@@ -145,6 +148,9 @@ class RunDriver {
   boost::asio::awaitable<void> stay_paused();
   boost::asio::awaitable<void> until_over_pause(std::uint64_t noticed_us);
   boost::asio::awaitable<void> check_travel(Place place);
+  boost::asio::awaitable<bool> has_room_from_0(const TimeLine& rest, double position_m);
+  boost::asio::awaitable<bool> go_back();
+  const CommandFeed& feed_now() const { return way_feed_ ? *way_feed_ : feed_; }
   boost::asio::awaitable<Rest> rest(bool ends_with_link);
   void go_on_from(Place place);
   void count_interruption(Place place, std::int64_t since_us);
@@ -187,6 +193,7 @@ class RunDriver {
   TimeLine line_;
   AbortWatch watch_;
   CommandFeed feed_;
+  std::optional<CommandFeed> way_feed_;  // while the robot goes back to 0
   std::optional<Abort> abort_;
   std::optional<Pause> pause_;
   const TravelCheck travel_check_;
@@ -202,6 +209,10 @@ class RunDriver {
   std::int64_t rested_at_us_ = 0;             // steady: seen at rest, in a pause
   std::uint64_t generation_robot_us_ = 0;     // when it began
   std::uint64_t paused_robot_us_ = 0;         // where the line was broken off; 0: it goes on
+  std::optional<std::uint64_t> broken_off_;   // tick, once the robot has gone back meanwhile
+  bool makes_room_ = false;                   // before it goes on the robot goes back to 0
+  int ways_back_ = 0;                         // so far
+  int told_to_rest_ = 0;                      // how often a pause or an interruption was asked for
   std::uint64_t seen_robot_us_ = 0;           // latest sample of this boot
   int link_losses_ = 0;
   std::uint64_t driven_robot_us_ = 0;      // latest sample of this boot with the motor on, or in auto

@@ -22,6 +22,7 @@ constexpr std::uint64_t kLongestLeaseUs = 600'000;
 
 // SAFETY: also while it is interrupted: then it does not go on by itself any more.
 void RunDriver::pause(std::string reason, std::string detail) {
+  ++told_to_rest_;
   pause_.emplace(Abort{std::move(reason), std::move(detail)}, parts_.clock.steady_us());
   changed_.notify();
 }
@@ -37,7 +38,8 @@ void RunDriver::interrupt(Abort why) {
 }
 
 void RunDriver::pause_for(Pause pause) {
-  if (pause_ && (!pause_->ends_by_itself || pause.ends_by_itself)) return;
+  ++told_to_rest_;
+  if (pause_ && !way_feed_ && (!pause_->ends_by_itself || pause.ends_by_itself)) return;
   pause_ = std::move(pause);
   changed_.notify();
 }
@@ -51,28 +53,66 @@ asio::awaitable<void> RunDriver::stay_paused() {
   // Not later than a lease lasts: this computer, too, may have been away.
   const station::RobotState& robot = *parts_.station.find(request_.robot_id);
   const std::uint64_t noticed_us = std::min(robot_now_us(robot), robot.latest_robot_time_us + kLongestLeaseUs);
-  const std::int64_t since_us = pause_->since_us;
+  std::int64_t since_us = pause_->since_us;
   std::uint64_t tick = broken_off(noticed_us);
   paused_robot_us_ = feed_.robot_time_us(tick);
   const InterruptionNote note{*this, pause_->why};  // also where this is cancelled
   begin_generation();
-  bool is_away = false;
-  do {  // SAFETY: a pause that comes while the way is computed holds it
+  for (bool is_over = false; !is_over && !abort_;) {  // SAFETY: a pause that comes while the way is computed holds it
     co_await until_over_pause(noticed_us);
     const int losses = link_losses_;
     tick = broken_off(noticed_us);  // samples of then may have come since
     paused_robot_us_ = feed_.robot_time_us(tick);
     if (!abort_) co_await check_travel(place_of(tick));
     const station::RobotState& now = *parts_.station.find(request_.robot_id);
-    is_away = losses != link_losses_ || now.link != station::LinkState::connected;
+    bool is_away = losses != link_losses_ || now.link != station::LinkState::connected;
+    is_over = !abort_ && !is_away && is_over_pause(now, true);
+    if (is_over && makes_room_ && !abort_) {
+      is_over = false;
+      broken_off_ = tick;
+      const std::int64_t begun_us = parts_.clock.steady_us();
+      is_away = !co_await go_back();
+      since_us += parts_.clock.steady_us() - begun_us;
+      pause_->goes_on_at_us = 0;
+    }
     // SAFETY: who asked before the link was back, or the count-down of then, says nothing of now.
     if (is_away) pause_->is_resumed = false, pause_->goes_on_at_us = 0;
-  } while (!abort_ && (is_away || !is_over_pause(*parts_.station.find(request_.robot_id), true)));
+  }
   if (!abort_ && pause_->ends_by_itself) count_interruption(place_of(tick), since_us);
   if (!abort_) go_on_from(place_of(tick));
 }
 
+// In closed loop, by the same rules as a step of the line; what is late or speaks against it brings the robot to rest.
+// False: it was broken off.
+asio::awaitable<bool> RunDriver::go_back() {
+  const int told = told_to_rest_;
+  ++ways_back_;
+  pause_->goes_on_at_us = 0;
+  pause_->shown.detail = fmt::format("{}; it goes back to 0, to make room for what is left", pause_->why.detail);
+  begin_generation();
+  wrong_mode_since_us_ = 0;
+  const std::uint64_t begins_us =
+      robot_now_us(*parts_.station.find(request_.robot_id)) + static_cast<std::uint64_t>(kBeginsAfter.count());
+  way_feed_.emplace(*request_.way_back, 0, begins_us);
+  for (;;) {
+    const station::RobotState& robot = *parts_.station.find(request_.robot_id);
+    if (const auto& found = watch_.fault()) abort(*found);
+    if (!abort_) watch_samples();
+    if (!abort_) watch(robot);
+    const bool is_over = way_feed_->is_over(robot.latest_robot_time_us) && on_their_way_ == 0;
+    if (abort_ || told != told_to_rest_ || is_over) break;
+    feed(robot);
+    co_await changed_.wait_until(parts_.clock, parts_.clock.steady_us() + kTurn.count());
+  }
+  way_feed_.reset();
+  begin_generation();
+  const Rest found = co_await rest(true);
+  pause_->since_us = parts_.clock.steady_us();  // by now its client may be away for a while again
+  co_return !abort_ && told == told_to_rest_ && found == Rest::at_rest;
+}
+
 RunDriver::InterruptionNote::~InterruptionNote() {
+  driver.broken_off_.reset();
   try {
     driver.note_interruption(std::exchange(driver.paused_robot_us_, 0), cause);
   } catch (const std::exception& error) {
@@ -134,6 +174,7 @@ void RunDriver::note_away(std::int64_t since_us) {
 // Where the motor was on last; what was commanded behind that has not been done, if it is not long ago. A robot that
 // loses its link goes on for as long as its lease lasts.
 std::uint64_t RunDriver::broken_off(std::uint64_t noticed_us) const {
+  if (broken_off_) return *broken_off_;
   const std::uint64_t first = feed_.tick_at(0), noticed = feed_.tick_at(noticed_us);
   const std::uint64_t earliest = std::max(noticed - std::min(noticed, kMostUndoneTicks), first);
   const bool has_moved = driven_robot_us_ >= feed_.robot_time_us(first);
@@ -156,11 +197,20 @@ asio::awaitable<void> RunDriver::check_travel(Place place) {
   if (!robot.sample) co_return;
   const double position_m =
       static_cast<double>(robot.sample->position_m) - static_cast<double>(robot.context.disturbance_m.value_or(0));
-  TimeLine rest = rest_of(line_, place.step, place.tick);
-  const Result<void> allowed = co_await travel_check_(std::move(rest), position_m);
-  if (!allowed)
+  const TimeLine rest = rest_of(line_, place.step, place.tick);
+  const Result<void> allowed = co_await travel_check_(rest, position_m);
+  makes_room_ = !allowed && co_await has_room_from_0(rest, position_m);
+  if (!allowed && !makes_room_)
     abort({"no_room", fmt::format("{}; going on from {:.3f} m, {}", pause_ ? pause_->why.detail : "", position_m,
                                   allowed.error().detail)});
+}
+
+asio::awaitable<bool> RunDriver::has_room_from_0(const TimeLine& rest, double position_m) {
+  if (!request_.way_back || ways_back_ >= kMostBegins) co_return false;
+  const Result<void> back = co_await travel_check_(*request_.way_back, position_m);
+  if (!back) co_return false;
+  const Result<void> allowed = co_await travel_check_(rest, 0);
+  co_return allowed.has_value();
 }
 
 void RunDriver::count_interruption(Place place, std::int64_t since_us) {
@@ -237,7 +287,8 @@ bool RunDriver::counts_down() {
   }
   if (pause_->goes_on_at_us == 0) pause_->goes_on_at_us = now_us + kCountDown.count();
   const std::int64_t left_us = pause_->goes_on_at_us - now_us;
-  pause_->shown.detail = fmt::format("{}; it goes on in {} s unless it is paused", pause_->why.detail,
+  pause_->shown.detail = fmt::format("{}; it {} in {} s unless it is paused", pause_->why.detail,
+                                     makes_room_ ? "goes back to 0, to make room for what is left," : "goes on",
                                      std::max<std::int64_t>(0, (left_us + 999'999) / 1'000'000));
   return left_us <= 0;
 }
