@@ -6,15 +6,13 @@
 #include <fmt/ranges.h>
 
 #include <CLI/CLI.hpp>
-#include <fstream>
-#include <iostream>
-#include <iterator>
 #include <limits>
 #include <stdexcept>
 
 #include "server/cli/accounts/account_access.hpp"
 #include "server/cli/accounts/station_client.hpp"
 #include "server/cli/terminal/exit_status.hpp"
+#include "server/cli/terminal/input.hpp"
 #include "server/cli/terminal/options.hpp"
 #include "server/cli/terminal/output.hpp"
 
@@ -47,11 +45,7 @@ json ask(const DesignCommand& options, const std::string& method, const std::str
 }
 
 json read_document(const std::filesystem::path& file) {
-  std::ifstream from_file;
-  if (file != "-") from_file.open(file);
-  std::istream& in = file == "-" ? std::cin : from_file;
-  if (!in) throw std::runtime_error{fmt::format("cannot read '{}'", file.string())};
-  json document = json::parse(std::string{std::istreambuf_iterator<char>{in}, {}}, nullptr, false);
+  json document = read_json(file.string());
   if (document.is_object()) return document;
   throw std::runtime_error{
       fmt::format("'{}' is not a JSON object, as `rheonaut identify --json` writes it", file.string())};

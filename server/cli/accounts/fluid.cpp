@@ -6,14 +6,12 @@
 #include <fmt/ranges.h>
 
 #include <CLI/CLI.hpp>
-#include <fstream>
-#include <iostream>
-#include <iterator>
 #include <stdexcept>
 #include <vector>
 
 #include "server/cli/accounts/account_access.hpp"
 #include "server/cli/accounts/station_client.hpp"
+#include "server/cli/terminal/input.hpp"
 #include "server/cli/terminal/options.hpp"
 
 namespace server::cli {
@@ -45,12 +43,7 @@ std::string path_of_model(const std::string& fluid) {
 }
 
 json read_model(const std::filesystem::path& file) {
-  std::ifstream from_file;
-  if (file != "-") from_file.open(file);
-  std::istream& in = file == "-" ? std::cin : from_file;
-  if (!in) throw std::runtime_error{fmt::format("cannot read '{}'", file.string())};
-  const std::string text{std::istreambuf_iterator<char>{in}, {}};
-  json model = json::parse(text, nullptr, false);
+  json model = read_json(file.string());
   if (model.is_object()) return model;
   throw std::runtime_error{
       fmt::format("'{}' is not a JSON object, as `rheonaut estimator --json` writes it", file.string())};

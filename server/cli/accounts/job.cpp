@@ -5,15 +5,13 @@
 #include <fmt/ostream.h>
 
 #include <CLI/CLI.hpp>
-#include <fstream>
-#include <iostream>
-#include <iterator>
 #include <limits>
 #include <stdexcept>
 #include <string>
 
 #include "server/cli/accounts/account_access.hpp"
 #include "server/cli/accounts/station_client.hpp"
+#include "server/cli/terminal/input.hpp"
 #include "server/cli/terminal/options.hpp"
 #include "server/cli/terminal/output.hpp"
 #include "server/cli/terminal/progress.hpp"
@@ -45,11 +43,7 @@ json ask(const JobCommand& options, const std::string& method, const std::string
 }
 
 json read_request(const std::filesystem::path& file) {
-  std::ifstream from_file;
-  if (file != "-") from_file.open(file);
-  std::istream& in = file == "-" ? std::cin : from_file;
-  if (!in) throw std::runtime_error{fmt::format("cannot read '{}'", file.string())};
-  json request = json::parse(std::string{std::istreambuf_iterator<char>{in}, {}}, nullptr, false);
+  json request = read_json(file.string());
   if (request.is_object()) return request;
   throw std::runtime_error{
       fmt::format("'{}' is not a JSON object such as {{\"kind\":\"identify\",\"run_id\":1}}", file.string())};

@@ -6,7 +6,6 @@
 
 #include <CLI/CLI.hpp>
 #include <charconv>
-#include <fstream>
 #include <limits>
 #include <stdexcept>
 
@@ -14,6 +13,7 @@
 #include "server/cli/accounts/station_client.hpp"
 #include "server/cli/design/discretise.hpp"
 #include "server/cli/terminal/exit_status.hpp"
+#include "server/cli/terminal/input.hpp"
 #include "server/cli/terminal/options.hpp"
 #include "server/cli/terminal/output.hpp"
 
@@ -134,9 +134,7 @@ int show_controller(const Robot& robot, bool as_json, std::ostream& out) {
 
 // What discretise printed; anything else is a controller in continuous time, which is discretised here.
 json sections_in(const std::string& file, const Robot& robot) {
-  std::ifstream in{file};
-  if (!in) throw std::runtime_error{fmt::format("cannot read '{}'", file)};
-  const json content = json::parse(in, nullptr, false);
+  const json content = read_json(file);
   const auto is_robots_controller = [&content] { return content.is_object() && content.contains("period_us"); };
   if (content.is_object() && content.contains("sections")) {
     json needed;

@@ -6,11 +6,11 @@
 
 #include <CLI/CLI.hpp>
 #include <boost/asio/io_context.hpp>
-#include <fstream>
 #include <stdexcept>
 
 #include "server/cli/commission/commissioning.hpp"
 #include "server/cli/terminal/exit_status.hpp"
+#include "server/cli/terminal/input.hpp"
 #include "server/cli/terminal/options.hpp"
 #include "server/runtime/clock.hpp"
 #include "server/runtime/exceptions.hpp"
@@ -23,9 +23,7 @@ using nlohmann::json;
 json answers_of(const Commission& options) {
   json answers = json::object();
   if (options.answers) {
-    std::ifstream in{*options.answers};
-    if (!in) throw std::runtime_error{fmt::format("cannot read '{}'", options.answers->string())};
-    answers = json::parse(in, nullptr, false);
+    answers = read_json(options.answers->string());
     if (!answers.is_object()) {
       throw UsageError{fmt::format("'{}' is not a JSON object of answers", options.answers->string())};
     }

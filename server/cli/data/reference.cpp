@@ -7,8 +7,6 @@
 #include <CLI/CLI.hpp>
 #include <charconv>
 #include <cmath>
-#include <fstream>
-#include <iterator>
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
@@ -17,6 +15,7 @@
 #include "server/cli/accounts/author.hpp"
 #include "server/cli/accounts/station_client.hpp"
 #include "server/cli/terminal/exit_status.hpp"
+#include "server/cli/terminal/input.hpp"
 #include "server/cli/terminal/options.hpp"
 #include "server/cli/terminal/progress.hpp"
 #include "server/config/data_folder.hpp"
@@ -71,13 +70,7 @@ void add_clock_options(CLI::App& sub, ReferenceCommand& options) {
 
 std::string text_of_file(const std::string& file) {
   if (!fs::is_regular_file(file)) throw std::runtime_error{fmt::format("cannot read '{}': no file", file)};
-  if (const auto bytes = fs::file_size(file); bytes > analysis::kMaxReferenceBytes) {
-    throw std::runtime_error{
-        fmt::format("'{}' has {} bytes, allowed are {}", file, bytes, analysis::kMaxReferenceBytes)};
-  }
-  std::ifstream in{file, std::ios::binary};
-  if (!in) throw std::runtime_error{fmt::format("cannot read '{}'", file)};
-  return {std::istreambuf_iterator<char>{in}, {}};
+  return read_text(file, analysis::kMaxReferenceBytes);
 }
 
 analysis::ReferenceClockRequest clock_of(const ReferenceCommand& options) {

@@ -5,56 +5,25 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <array>
-#include <cerrno>
 #include <cmath>
-#include <cstring>
-#include <filesystem>
-#include <fstream>
 #include <stdexcept>
 #include <utility>
 
 #include "base/json_text.hpp"
-#include "base/nesting.hpp"
 #include "control/search/missed_ticks.hpp"
 #include "server/analysis/control_json.hpp"
 #include "server/analysis/motion_at_start.hpp"
+#include "server/cli/terminal/input.hpp"
 #include "server/cli/terminal/options.hpp"
 #include "server/storage/samples/position_sd.hpp"
 
 namespace server::cli {
 namespace {
 
-constexpr std::size_t kMaxJsonBytes = 1 << 20;
 constexpr std::size_t kMaxCsvBytes = 512 << 20;
 
 [[noreturn]] void refuse(const std::string& file, const std::string& why) {
   throw std::runtime_error{fmt::format("{}: {}", file, why)};
-}
-
-std::string read_text(const std::string& file, std::size_t max_bytes) {
-  if (std::filesystem::is_directory(file)) refuse(file, "is a folder; give a file");
-  std::ifstream stream{file, std::ios::binary};
-  if (!stream) refuse(file, fmt::format("cannot be read: {}", std::strerror(errno)));
-  std::string text;
-  for (std::array<char, 65536> block{}; stream.read(block.data(), block.size()) || stream.gcount() > 0;) {
-    text.append(block.data(), static_cast<std::size_t>(stream.gcount()));
-    if (text.size() > max_bytes) refuse(file, fmt::format("has more than {} bytes", max_bytes));
-  }
-  if (stream.bad()) refuse(file, fmt::format("cannot be read: {}", std::strerror(errno)));
-  return text;
-}
-
-nlohmann::json read_json(const std::string& file) {
-  const std::string text = read_text(file, kMaxJsonBytes);
-  if (base::is_json_deeper(text, base::kMostJsonDepth)) {
-    refuse(file, fmt::format("has lists and objects in each other, more than {} deep", base::kMostJsonDepth));
-  }
-  try {
-    return nlohmann::json::parse(text);
-  } catch (const nlohmann::json::exception& error) {
-    refuse(file, "is not JSON: " + base::fault_of(error));
-  }
 }
 
 template <class T>

@@ -3,10 +3,10 @@
 
 #include <fmt/format.h>
 
-#include <fstream>
 #include <stdexcept>
 
 #include "server/cli/accounts/station_client.hpp"
+#include "server/cli/terminal/input.hpp"
 #include "server/runtime/private_file.hpp"
 
 namespace server::cli {
@@ -18,8 +18,7 @@ namespace {
 constexpr int kVersion = 1;
 
 json read_document(const std::filesystem::path& file) {
-  std::ifstream in{file};
-  json document = json::parse(in, nullptr, false);
+  json document = read_json(file.string());
   const bool is_ours = document.is_object() && document.value("version", 0) == kVersion &&
                        document.value("stages", json()).is_object() && document.contains("request");
   if (is_ours) return document;

@@ -1,22 +1,18 @@
 // A file is sent as it is.
 #include "server/cli/experiments/profile_file.hpp"
 
-#include <fmt/format.h>
-
 #include <filesystem>
-#include <fstream>
-#include <sstream>
-#include <stdexcept>
+
+#include "server/cli/terminal/input.hpp"
 
 namespace server::cli {
+
+constexpr std::size_t kMaxProfileBytes = 1 << 20;
 
 std::string profile_document(const std::string& name_or_file) {
   const bool is_path = name_or_file.find_first_of("./") != std::string::npos;  // no profile's name has one
   if (!is_path && !std::filesystem::is_regular_file(name_or_file)) return name_or_file;
-  std::ifstream file{name_or_file, std::ios::binary};
-  std::ostringstream text;
-  if (!(file && text << file.rdbuf())) throw std::runtime_error{fmt::format("cannot read '{}'", name_or_file)};
-  return text.str() + "\n";
+  return read_text(name_or_file, kMaxProfileBytes) + "\n";
 }
 
 }  // namespace server::cli

@@ -48,6 +48,14 @@ TEST_F(BadInput, ModelFiles) {
   EXPECT_THAT(plant(std::string(400'000, '[') + std::string(400'000, ']')), HasSubstr("more than 64 deep"));
 }
 
+TEST_F(BadInput, FilesForAStationAreOfBoundedDepthAndSize) {
+  save("deep.json", R"({"a":)" + std::string(200'000, '[') + std::string(200'000, ']') + "}");
+  for (const char* command : {"job begin", "fluid model newtonian", "design save --kind model --name x"}) {
+    EXPECT_THAT(complaint(fmt::format("{} @deep.json --data @.", command)), HasSubstr("more than 64 deep"));
+    EXPECT_THAT(complaint(fmt::format("{} /dev/zero --data @.", command)), HasSubstr("has more than 1048576 bytes"));
+  }
+}
+
 TEST_F(BadInput, ModelFilesMayHaveRemarksAndLackB3) {
   save("m.json",
        R"({"kp":0.1,"b1":0.005682,"b2":0.11031,"alpha":1.7263,"beta":0.8682,"comment":"eq. 29","name":"oil"})");
