@@ -63,9 +63,13 @@ export class ExperimentsApi {
     one: this.one,
     prediction: this.prediction,
     first_sample: this.first_sample,
+    first_wait_us: this.first_wait_us,
   });
   first_sample = async (run_id: number) =>
     (await this.ask<{ samples: StoredSample[] }>('GET', `/runs/${run_id}/samples?limit=1`)).samples[0] ?? null;
+  // The robot's clock where a run was interrupted first, and the line of its prediction stood still; null: it was not.
+  first_wait_us = async (run_id: number) =>
+    (await this.ask<RunRecord>('GET', `/runs/${run_id}`)).interrupted[0]?.from_robot_time_us ?? null;
   // Where the robot believed that it was in a run, from a moment on.
   estimate_in = (run_id: number, from_us: number, points: number) => {
     const channels = 'estimated_position_m,position_sd_m';

@@ -11,6 +11,7 @@ export interface PredictionWays {
   one(experiment_id: number): Promise<Experiment>;
   prediction(experiment_id: number, run: number): Promise<Prediction>;
   first_sample(run_id: number): Promise<StoredSample | null>;
+  first_wait_us(run_id: number): Promise<number | null>;
 }
 
 const kMostAtOnce = 24; // predictions in one stretch; of more the newest
@@ -95,10 +96,20 @@ export class PredictionLoader {
     const key = `${experiment_id}/${run.number}`;
     const zero_s = run.ended_at_us === null ? running_zero_s : await this.zero_of(key, run);
     if (zero_s === null) return null;
-    const said = this.answers.get(key) ?? (await this.ways.prediction(experiment_id, run.number));
-    this.answers.set(key, said);
+    const said = this.answers.get(key) ?? (await this.prediction_of(experiment_id, run));
+    if (run.ended_at_us !== null) this.answers.set(key, said);
     const { t_s, position_m, position_sd_m = null } = said;
     return t_s && position_m ? { key, zero_s, t_s, position_m, position_sd_m } : null;
+  }
+
+  // As far as the run was not interrupted: what came later, or from another place, was not predicted.
+  private async prediction_of(experiment_id: number, { number, steps, run_id, ended_at_us }: ExperimentRun) {
+    const said = await this.ways.prediction(experiment_id, number);
+    const begun_us = steps[0]?.robot_time_us;
+    const wait_us = run_id === null || ended_at_us === null ? null : await this.ways.first_wait_us(run_id);
+    if (wait_us === null || begun_us === undefined || !said.t_s) return said;
+    const holds_for = said.t_s.filter((time_s) => time_s < (wait_us - begun_us) / 1e6).length;
+    return { ...said, t_s: said.t_s.slice(0, holds_for), position_m: said.position_m?.slice(0, holds_for) ?? [] };
   }
 
   // The robot's clock at the first step, laid on UTC as the first sample of the run is.

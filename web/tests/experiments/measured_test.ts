@@ -48,6 +48,7 @@ test('of a run that has ended the record says it: the middle of each point, and 
   expect(low![0]).toBeCloseTo(0.006, 6);
   expect(high![0]).toBeCloseTo(0.034, 6);
   expect([low![1], high![1]], 'how sure the robot was is not known').toEqual([null, null]);
+  expect(measured_in(overview, 1_040_000, 0.05).t_s, 'up to where it was interrupted').toHaveLength(2);
 });
 
 // Position n mm at n / 100 s of the robot, which here is page time as well; the first batch came 0.3 s late.

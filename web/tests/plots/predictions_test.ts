@@ -39,7 +39,7 @@ const summary = (change: Partial<ExperimentSummary>) =>
     ...change,
   }) as ExperimentSummary;
 
-function ways_of(list: ExperimentSummary[], run: object = {}) {
+function ways_of(list: ExperimentSummary[], run: object = {}, wait_us: number | null = null) {
   const asked: string[] = [];
   const runs = [
     {
@@ -64,6 +64,7 @@ function ways_of(list: ExperimentSummary[], run: object = {}) {
     },
     // The run's first sample was made at 2 s of the robot's clock.
     first_sample: () => Promise.resolve({ utc_us: (kT0_s + 2) * 1e6, robot_time_us: 2_000_000 } as never),
+    first_wait_us: () => Promise.resolve(wait_us),
   };
   let now_ms = 0;
   const loader = new PredictionLoader(
@@ -80,6 +81,12 @@ test('it begins where the robot began its first step', async () => {
   await loader.look(kShown, null);
   expect(loader.found).toHaveLength(1);
   expect(loader.found[0]?.zero_s).toBe(kT0_s + 5);
+});
+
+test('it ends where its run was interrupted', async () => {
+  const { loader } = ways_of([summary({})], {}, 5_500_000);
+  await loader.look(kShown, null);
+  expect(loader.found[0]?.t_s).toEqual([0]);
 });
 
 test('of an experiment that ran at another time nothing is asked', async () => {

@@ -10,6 +10,7 @@ export interface Measured {
   position_m: number[]; // of an estimate
   low_m: number[]; // two standard deviations below and above it; NaN: not known
   high_m: number[];
+  until_s: number; // where its run was interrupted first; Infinity: it was not
 }
 
 const kPaused_s = 1; // the beginning that is reported moves so far only by a pause
@@ -40,7 +41,7 @@ export class RunBegin {
 
 // As far as the page has received it. Times of the ring are page time.
 export function measured_of(ring: SampleRing, began_s: number, elapsed_s: number): Measured {
-  const found: Measured = { t_s: [], position_m: [], low_m: [], high_m: [] };
+  const found: Measured = { t_s: [], position_m: [], low_m: [], high_m: [], until_s: Infinity };
   const { estimate_m, estimate_low_m, estimate_high_m } = ring.columns;
   for (let index = ring.first_index; index < ring.next_index; ++index) {
     const slot = index % ring.capacity;
@@ -54,15 +55,17 @@ export function measured_of(ring: SampleRing, began_s: number, elapsed_s: number
   return found;
 }
 
-// The same of a run that has ended, as it is recorded; `zero_us`: the UTC at which its prediction begins.
-export function measured_in(overview: Overview, zero_us: number): Measured {
+// The same of a run that has ended, as it is recorded, up to a moment; `zero_us`: the UTC at which its prediction begins.
+export function measured_in(overview: Overview, zero_us: number, until_s = Infinity): Measured {
   const { first_utc_us, last_utc_us, estimated_position_m: estimate_m, position_sd_m } = overview;
-  const found: Measured = { t_s: [], position_m: [], low_m: [], high_m: [] };
+  const found: Measured = { t_s: [], position_m: [], low_m: [], high_m: [], until_s };
   first_utc_us.forEach((first_us, at) => {
+    const since_s = ((first_us + (last_utc_us[at] ?? first_us)) / 2 - zero_us) / 1e6;
+    if (since_s >= until_s) return;
     const least_m = estimate_m?.min[at] ?? NaN;
     const largest_m = estimate_m?.max[at] ?? NaN;
     const spread_m = kSpread_sd * (position_sd_m?.max[at] ?? NaN);
-    found.t_s.push(((first_us + (last_utc_us[at] ?? first_us)) / 2 - zero_us) / 1e6);
+    found.t_s.push(since_s);
     found.position_m.push((least_m + largest_m) / 2);
     found.low_m.push(least_m - spread_m);
     found.high_m.push(largest_m + spread_m);

@@ -237,6 +237,9 @@ function RunPlot({ session, experiment, summary, run }: RunPlotProps) {
           {' '}
           On the model {answer.model_of}, stored before the run{has_band ? '' : '; how sure it is, is not known'}
           {answer.ignores_flow ? '; without the flow of the pump' : ''}.
+          {measured && Number.isFinite(measured.until_s)
+            ? ` Measured up to ${measured.until_s.toFixed(1)} s, where the run was interrupted; what came later was not predicted.`
+            : ''}
         </span>
       </p>
       {(answer.problems ?? []).map((problem) => (
@@ -264,8 +267,12 @@ function useRecorded(session: Session, run: ExperimentRun | null, points: number
     const first = await session.experiments.first_sample(run_id);
     if (!first) return null;
     const zero_us = first.utc_us + begun_us - first.robot_time_us;
-    const overview = await session.experiments.estimate_in(run_id, zero_us, Math.min(points, kMostPoints));
-    return { run_id, measured: measured_in(overview, zero_us) };
+    const [overview, wait_us] = await Promise.all([
+      session.experiments.estimate_in(run_id, zero_us, Math.min(points, kMostPoints)),
+      session.experiments.first_wait_us(run_id),
+    ]);
+    const until_s = wait_us === null ? Infinity : (wait_us - begun_us) / 1e6;
+    return { run_id, measured: measured_in(overview, zero_us, until_s) };
   }, [run_id, begun_us, points]);
   return asked.answer !== null && asked.answer.run_id === run_id ? asked.answer.measured : null;
 }
