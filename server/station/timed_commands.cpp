@@ -53,22 +53,38 @@ void TimedCommands::choose_reason(RobotEntry& entry, const Client& holder) const
   if (may_wait && holder != timed.by) timed.drop_because = "control_ended";
 }
 
-bool TimedCommands::send_drop(RobotEntry& entry) {
-  CommandRequest request;
+CommandId TimedCommands::send_own(RobotEntry& entry, CommandRequest request) {
   request.robot_id = entry.robot.id;
-  request.action.which_action = rheonaut_Command_drop_timed_tag;
-  request.actor = "station:control";
   request.time_to_live = microseconds{protocol::kMaxTimeToLiveUs};
   request.answer_grace = kOwnAnswerGrace;
-  const auto drop = make_pending(loop_, clock_, request, entry.robot);
-  if (!entry.link->send(drop->wire, drop->deadline_us)) return false;
+  const auto own = make_pending(loop_, clock_, request, entry.robot);
+  if (!entry.link->send(own->wire, own->deadline_us)) return 0;
+  entry.commands.add(own);
+  notifier_.publish(own->record);
+  return own->record.id;
+}
+
+bool TimedCommands::bring_to_rest(RobotEntry& entry) {
+  if (entry.link == nullptr) return true;  // a robot without a link comes to rest by itself
+  CommandRequest request;
+  request.action.which_action = rheonaut_Command_set_mode_tag;
+  request.action.action.set_mode.mode = rheonaut_MODE_MANUAL;
+  request.arguments = R"({"mode":"manual"})";
+  request.actor = "station:limits";
+  return send_own(entry, std::move(request)) != 0;
+}
+
+bool TimedCommands::send_drop(RobotEntry& entry) {
+  CommandRequest request;
+  request.action.which_action = rheonaut_Command_drop_timed_tag;
+  request.actor = "station:control";
+  const CommandId id = send_own(entry, std::move(request));
+  if (id == 0) return false;
   entry.timed.by = {};
   entry.timed.until_robot_us = 0;
   entry.timed.is_of_earlier_run = false;
   entry.timed.drop_because = nullptr;
-  entry.timed.drop_id = drop->record.id;
-  entry.commands.add(drop);
-  notifier_.publish(drop->record);
+  entry.timed.drop_id = id;
   return true;
 }
 

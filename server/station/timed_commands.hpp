@@ -25,6 +25,9 @@ class TimedCommands {
   // The same for everything that waits, for a reason of the station's own.
   void drop_all(RobotEntry& entry, const Client& holder, const char* reason);
 
+  // The robot comes to rest, in nobody's name. False: there is no room for that on the link now.
+  bool bring_to_rest(RobotEntry& entry);
+
   // SAFETY: what still waits for the link is not sent once it may no longer be, timed or not; but it may end a motion.
   void withdraw_queued(RobotEntry& entry, const char* reason,
                        const std::function<bool(const PendingCommand&)>& is_meant);
@@ -32,6 +35,7 @@ class TimedCommands {
  private:
   void choose_reason(RobotEntry& entry, const Client& holder) const;
   bool send_drop(RobotEntry& entry);
+  CommandId send_own(RobotEntry& entry, CommandRequest request);  // 0: there is no room for it
   void end_timed(RobotEntry& entry, const char* reason);
 
   boost::asio::io_context& loop_;

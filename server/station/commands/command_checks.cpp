@@ -168,4 +168,13 @@ Result<void> check_command(const protocol::Command& command, const RobotState& r
   return {};
 }
 
+Result<void> check_motion(const RobotState& robot, const config::CommandLimits& limits, const OrdersAhead& ahead) {
+  auto checked = check_running_schedules(ahead, robot, limits);
+  if (!checked || !robot.sample) return checked;
+  const bool has_setpoint = robot.context.mode == rheonaut_MODE_AUTO && robot.context.setpoint_m;
+  if (!has_setpoint) return check_running_duty(robot, limits);
+  return within("the setpoint in force", *robot.context.setpoint_m, limits.setpoint_min_m - 1e-6,
+                limits.setpoint_max_m + 1e-6);
+}
+
 }  // namespace server::station

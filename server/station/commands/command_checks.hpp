@@ -18,4 +18,7 @@ bool needs_control(const protocol::Command& command);
 Result<void> check_command(const protocol::Command& command, const RobotState& robot, const config::Envelope& envelope,
                            const OrdersAhead& ahead);
 
+// Whether what the robot does now, as telemetry shows it, and its schedules that run keep within these limits.
+Result<void> check_motion(const RobotState& robot, const config::CommandLimits& limits, const OrdersAhead& ahead);
+
 }  // namespace server::station

@@ -17,11 +17,12 @@ class TimedLimitsTest : public TimedTest {
     show_setpoint(0);
   }
   static config::Envelope envelope() {
-    config::CommandLimits limits, water, oil;
+    config::CommandLimits limits, water, oil, honey;
     limits.setpoint_step_m = water.setpoint_step_m = 0.25;
     water.duty_max = 0.5;
     oil.power_s = 10;
-    return config::Envelope{limits, {{"water", water}, {"oil", oil}}};
+    honey.setpoint_max_m = 0.1;
+    return config::Envelope{limits, {{"water", water}, {"oil", oil}, {"honey", honey}}};
   }
   void show_setpoint(float setpoint_m) {
     auto frame = TestRobot::samples_frame(next_seq_++, 1, robot->robot_now_us(), 0);
@@ -140,7 +141,30 @@ TEST_F(TimedLimitsTest, ItIsDroppedWhenTheLimitsOfTheFluidBecomeNarrower) {
   EXPECT_EQ(drops(), 1U) << "the limits have become wider";
   ASSERT_TRUE(station.set_fluid("r1", "", {"a", "", 0}));
   clock.settle();
-  EXPECT_EQ(drops(), 2U) << "the strictest hold";
+  EXPECT_EQ(drops(), 1U) << "the strictest would accept it";
+}
+
+// SAFETY: a motion does not outlive the limits that allowed it.
+TEST_F(TimedLimitsTest, AMotionBeyondTheLimitsOfAnotherFluidEnds) {
+  show_setpoint(0.25F);
+  ASSERT_TRUE(station.set_fluid("r1", "water", {"a", "", 0}));
+  clock.settle();
+  EXPECT_TRUE(robot->commands().empty()) << "0.25 m is within those of water";
+  ASSERT_TRUE(station.set_fluid("r1", "honey", {"a", "", 0}));
+  clock.settle();
+  ASSERT_FALSE(robot->commands().empty());
+  EXPECT_EQ(robot->commands().back().action.set_mode.mode, rheonaut_MODE_MANUAL);
+  EXPECT_EQ(latest_of_kind("set_mode").actor, "station:limits");
+}
+
+TEST_F(TimedLimitsTest, WhereItsEndCannotBeSentTheFluidStays) {
+  show_setpoint(0.25F);
+  while (refusal(now(ping(), 9s)).empty()) {
+  }
+  const auto named = station.set_fluid("r1", "honey", {"a", "", 0});
+  ASSERT_FALSE(named);
+  EXPECT_EQ(named.error().reason, "queue_full");
+  EXPECT_EQ(station.find("r1")->fluid, "non_newtonian");
 }
 
 TEST_F(TimedLimitsTest, WhatTheLinkHasNotTakenIsNotSentWhenTheLimitsBecomeNarrower) {
