@@ -1,11 +1,13 @@
-"""deploy/debian/backup-daily, with a program in place of rheonaut that writes the copy: which copies stay."""
+"""Scripts of the Debian package, with a program in place of rheonaut: which daily copies stay, and what a purge says."""
 import os
 import pathlib
+import shutil
 import subprocess
 import tempfile
 import unittest
 
-SCRIPT = pathlib.Path(__file__).resolve().parent.parent / "deploy/debian/backup-daily"
+SCRIPTS = pathlib.Path(__file__).resolve().parent.parent / "deploy/debian"
+SCRIPT = SCRIPTS / "backup-daily"
 AHEAD = [f"daily-203001{day:02}-000000.sqlite" for day in (1, 2, 3)]
 
 
@@ -84,6 +86,34 @@ if [ "$1" = check-config ]; then cat '{self.data}/checked.json'; exit; fi
         self.fill("daily-20250101-000000.sqlite", *AHEAD)
         self.assertNotEqual(0, self.back_up("exit 1").returncode)
         self.assertEqual(4, len(self.names()))
+
+
+class PurgeTest(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.root = pathlib.Path(folder.name)
+        (self.root / "var/lib/misc").mkdir(parents=True)
+        (self.root / "bin").mkdir()  # nothing of this machine but these is called
+        for name in ("cat", "rm", "sed"):
+            (self.root / "bin" / name).symlink_to(shutil.which(name))
+
+    def said_by_a_purge(self, data):
+        program = self.root / "rheonaut"
+        program.write_text(f"""#!/bin/sh\necho '  "data": "{data}",'\n""")
+        program.chmod(0o755)
+        env = {"PATH": str(self.root / "bin"), "DPKG_ROOT": str(self.root), "RHEONAUT_PROGRAM": str(program)}
+        return "".join(subprocess.run(["/bin/sh", SCRIPTS / script, step], env=env, check=True, capture_output=True,
+                                      text=True).stderr
+                       for script, step in (("prerm", "remove"), ("postrm", "remove"), ("postrm", "purge")))
+
+    def test_another_data_folder_is_named_and_stays(self):
+        data = self.root / "srv/lab"
+        data.mkdir(parents=True)
+        self.assertIn(f"the data folder {data} with its recordings stays", self.said_by_a_purge(data))
+        self.assertTrue(data.exists())
+        self.assertNotIn("stays", self.said_by_a_purge("/var/lib/rheonaut"))
+        self.assertEqual([], list((self.root / "var/lib/misc").iterdir()))
 
 
 if __name__ == "__main__":
