@@ -147,7 +147,7 @@ const folder = mkdtempSync(join(tmpdir(), 'rheonaut-film-'));
 try {
   await bench.start_station();
   const page = await bench.open_browser({ viewport: kSize, colorScheme: 'dark' });
-  await page.goto(await bench.login_link());
+  await bench.sign_in(page);
   await page.waitForTimeout(3000); // a robot beside a browser that begins would miss ticks
   bench.start_robot(kRobot, '--seed', '21');
   await page.locator('.annunciator h1').getByText(kRobot).waitFor();

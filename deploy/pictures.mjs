@@ -90,7 +90,7 @@ async function prepare() {
   bench.start_robot(kRobot, '--seed', '21');
   bench.start_fleet('tank', 11);
   page = await bench.open_browser({ viewport: kDesk, colorScheme: 'dark' });
-  await page.goto(await bench.login_link());
+  await bench.sign_in(page);
   await until('the robots are there', async () => (await bench.ask('/robots')).robots.length === 12);
   await confirm_model(bench, kRobot, 'non_newtonian');
   await bench.post('/robots/tank-4/emergency-stop', {});

@@ -28,6 +28,6 @@ export default defineConfig({
     assetsInlineLimit: 0,
     modulePreload: { polyfill: false },
   },
-  server: { proxy: { '/api': proxied, '/login': proxied, '/live': { ...proxied, ws: true } } },
+  server: { proxy: { '/api': proxied, '/live': { ...proxied, ws: true } } },
   test: { include: ['tests/**/*_test.ts'], environment: 'node' },
 });

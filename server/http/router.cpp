@@ -114,10 +114,10 @@ Answer Router::dispatch(Request request) const {
       const std::string& name = entry.segments[i];
       if (is_parameter(name)) request.param[name.substr(1, name.size() - 2)] = request.target.segments()[i];
     }
-    if (!route.is_stop) {
+    if (is_of_api && !route.is_stop) {
       auto parsed = query_of(request.target, route.query);
-      if (!parsed && is_of_api) co_return problem(parsed.error());
-      if (parsed) request.query = std::move(*parsed);
+      if (!parsed) co_return problem(parsed.error());
+      request.query = std::move(*parsed);
     }
     co_return co_await route.answer(std::move(request));
   }

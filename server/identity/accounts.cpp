@@ -27,7 +27,7 @@ std::string actor_of(const std::string& user, std::uint64_t session) {
 // What was taken away stays away while the station runs, but the disk does not know it.
 Error not_stored(Error error) {
   if (error.code != ErrorCode::unavailable) return error;
-  error.detail += ". It is in force, and a restart would undo it: make room and ask again";
+  error.detail += ". It is in force, and a restart would undo it: do what GET /api/v1/recording says, and ask again";
   return error;
 }
 

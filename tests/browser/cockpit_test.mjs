@@ -72,7 +72,7 @@ const steps = {
   },
 
   async 'the link opens the cockpit, and the robot selects itself'() {
-    await page.goto(await bench.login_link());
+    await bench.sign_in(page);
     await page.getByText('No robot yet').waitFor();
     bench.start_robot(kRobot);
     await page.locator('.annunciator h1').getByText(kRobot).waitFor();

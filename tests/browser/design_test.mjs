@@ -40,7 +40,7 @@ async function recorded(name, limits, steps) {
 const steps = {
   async 'without a run the view says how to get one, and a model of the paper is there to begin with'() {
     bench.start_robot(kRobot);
-    await page.goto(await bench.login_link());
+    await bench.sign_in(page);
     await page.locator('.annunciator h1').getByText(kRobot).waitFor();
     await page.keyboard.press('g');
     await page.keyboard.press('d');

@@ -176,7 +176,7 @@ async function stops_since(utc_us) {
 const steps = {
   async 'a station with a robot, a run that is over, one that is open, and an experiment'() {
     bench.start_robot(kRobot);
-    await page.goto(await bench.login_link());
+    await bench.sign_in(page);
     await page.locator('.annunciator h1').getByText(kRobot).waitFor();
     await live(page);
     const begun = await bench.post('/runs', { robot_id: kRobot, name: 'over' });

@@ -24,7 +24,7 @@ async function escape_stops(what, press = () => page.keyboard.press('Escape')) {
 
 const steps = {
   async 'the page opens no menu of the browser'() {
-    await page.goto(await bench.login_link());
+    await bench.sign_in(page);
     bench.start_robot(kRobot);
     await page.locator('.annunciator h1').getByText(kRobot).waitFor();
     await live(page);

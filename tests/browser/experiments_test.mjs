@@ -154,7 +154,7 @@ async function taken_over() {
 
 const steps = {
   async 'a profile that comes with the program is predicted, and its check list says that nothing is in the way'() {
-    await page.goto(await bench.login_link());
+    await bench.sign_in(page);
     bench.start_robot(kRobot);
     await page.locator('.annunciator h1').getByText(kRobot).waitFor();
     await page.keyboard.press('g');

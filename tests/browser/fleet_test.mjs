@@ -61,7 +61,7 @@ const steps = {
     await bench.cli(['user', 'add', 'vera', '--role', 'viewer'], kPassword);
     bench.start_robot(kRobot);
     await until('the robot is there', async () => (await robot()).link === 'connected');
-    await admin.goto(await bench.login_link());
+    await bench.sign_in(admin);
     await admin.locator('.annunciator h1').getByText(kRobot).waitFor();
     operator = await bench.open_page({ viewport: { width: 1440, height: 900 } });
     viewer = await bench.open_page({ viewport: { width: 1440, height: 900 } });

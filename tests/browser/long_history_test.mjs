@@ -119,7 +119,7 @@ const steps = {
 
   async 'the hour and what arrives now are on one axis'() {
     page.on('request', (request) => /\/(samples|overview)\?/.test(request.url()) && asked.push(request.url()));
-    await page.goto(await bench.login_link());
+    await bench.sign_in(page);
     await page.locator('.annunciator h1').getByText(kRobot).waitFor();
     await live(page);
     await settled();

@@ -19,7 +19,7 @@ const steps = {
     const file = join(bench.data, 'model.json');
     writeFileSync(file, JSON.stringify(model(0.11)));
     await bench.cli(['fluid', 'model', 'water', file]);
-    await page.goto(await bench.login_link());
+    await bench.sign_in(page);
     bench.start_robot(kRobot);
     await page.locator('.annunciator h1').getByText(kRobot).waitFor();
     await says('numeral', foot, 'model assumed');

@@ -34,7 +34,7 @@ async function value_at(share) {
 
 const steps = {
   async 'after a reload the past is there'() {
-    await page.goto(await bench.login_link());
+    await bench.sign_in(page);
     bench.start_robot(kRobot);
     await page.locator('.annunciator h1').getByText(kRobot).waitFor();
     await live();

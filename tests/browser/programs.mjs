@@ -112,6 +112,12 @@ export class Bench {
     return until('the login link is printed', () => /https?:\/\/\S+\/login\?code=\S+/.exec(this.station.output)?.[0]);
   }
 
+  async sign_in(page, link = null) {
+    await page.goto(link ?? (await this.login_link()));
+    await page.click('#use-link');
+    await page.waitForURL((url) => url.pathname === '/');
+  }
+
   start_robot(id, ...options) {
     this.robot = new Program('rheonaut-sim', '--station', this.endpoints.robots, '--id', id, ...options);
   }

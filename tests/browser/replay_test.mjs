@@ -77,7 +77,7 @@ const gap = () => {
 
 const steps = {
   async 'a run with a step, a disturbance and a gap is recorded'() {
-    await page.goto(await bench.login_link());
+    await bench.sign_in(page);
     bench.start_robot(kRobot);
     await page.locator('.annunciator h1').getByText(kRobot).waitFor();
     await command({ kind: 'zero_position' });

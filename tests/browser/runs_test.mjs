@@ -85,7 +85,7 @@ async function downloaded(selector) {
 
 const steps = {
   async 'without a run the view says how one is begun'() {
-    await page.goto(await bench.login_link());
+    await bench.sign_in(page);
     bench.start_robot(kRobot);
     await until('the robot is there', async () => (await page.locator('.annunciator h1').count()) === 1);
     await page.keyboard.press('g');

@@ -38,7 +38,7 @@ const hindered_at_ms = () => until('the button does not look as if it worked', (
 const steps = {
   async 'each view is reached by its link, its keys and its address, and "back" leads back'() {
     bench.start_robot(kRobot);
-    await page.goto(await bench.login_link());
+    await bench.sign_in(page);
     await shown.robot();
     await until('the robot stands in the address', async () => (await address()) === `#/robot/${kRobot}`);
     for (const view of kViews) {

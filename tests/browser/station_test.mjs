@@ -40,7 +40,7 @@ const choose = async (field, option) => {
 const steps = {
   async 'health: every line has a word, and all is well with two robots'() {
     bench.start_fleet('sim', 2);
-    await page.goto(await bench.login_link());
+    await bench.sign_in(page);
     await until('both robots are known', async () => (await bench.ask('/robots')).robots.length === 2);
     await page.click('#open-station');
     await until('all is well', async () => (await page.locator('#station-summary').getAttribute('data-word')) === 'good');
@@ -103,8 +103,16 @@ const steps = {
     await hold('#station-make-link', 'a link is made', () => is_there('#station-link'));
     const url = await text('#station-link-url');
     const other = await bench.open_page();
+    // What a picture or a prefetch of another page does to it: it is opened, and nobody presses.
+    for (let i = 0; i < 2; i += 1) assert.equal((await fetch(url)).headers.get('set-cookie'), null);
     await other.goto(url);
+    await other.locator('#use-link').waitFor();
+    await bench.sign_in(other, url);
     await other.locator('#emergency-stop').waitFor();
+    await other.context().clearCookies();
+    await other.goto(url);
+    await other.click('#use-link');
+    await other.locator('#link-error').getByText('This link is no longer valid').waitFor();
     await other.context().close();
     await page.locator('#station-link button', { hasText: 'Done' }).click();
     await until('it is gone', async () => !(await page.content()).includes(url));
@@ -132,7 +140,7 @@ const steps = {
 
   async 'a session is signed out, and its page with it'() {
     const other = await bench.open_page();
-    await other.goto((await bench.post('/login-links', {})).answer.url);
+    await bench.sign_in(other, (await bench.post('/login-links', {})).answer.url);
     await other.locator('#emergency-stop').waitFor();
     await open('sessions');
     await page.getByText('this page', { exact: true }).waitFor();

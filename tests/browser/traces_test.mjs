@@ -56,7 +56,7 @@ const drawn = (selector) =>
 
 const steps = {
   async 'without an experiment nothing is predicted'() {
-    await page.goto(await bench.login_link());
+    await bench.sign_in(page);
     bench.start_robot(kRobot);
     await page.locator('.annunciator h1').getByText(kRobot).waitFor();
     await live();

@@ -25,7 +25,7 @@ async function start_run(name) {
 
 const steps = {
   async 'with a disturbance the page shows where the robot is, and what its controller sees'() {
-    await page.goto(await bench.login_link());
+    await bench.sign_in(page);
     bench.start_robot(kRobot);
     await page.locator('.annunciator h1').getByText(kRobot).waitFor();
     await live();

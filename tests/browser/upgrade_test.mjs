@@ -94,7 +94,7 @@ const steps = {
   async 'a page of the station’s own build says nothing, also after the station was started again'() {
     bench.start_robot(kRobot);
     await start_front();
-    await page.goto((await bench.login_link()).replace(bench.http, front_url));
+    await bench.sign_in(page, (await bench.login_link()).replace(bench.http, front_url));
     await page.locator('.annunciator h1').getByText(kRobot).waitFor();
     await live();
     await until('it has looked', () => looks > 0);

@@ -1,5 +1,6 @@
 """What a person does first, with real programs: a robot that finds the station by its folder, links into the page, and
 ports that are taken."""
+import json
 import socket
 import subprocess
 import unittest
@@ -15,17 +16,20 @@ def taken_port():
     return taken, f"127.0.0.1:{taken.getsockname()[1]}"
 
 
-def opened(url):
-    """Status and body of a page, without following where it leads."""
-    class Stay(urllib.request.HTTPRedirectHandler):
-        def redirect_request(self, *_):
-            return None
-
+def opened(url, body=None, **headers):
+    """Status and body of the answer."""
     try:
-        with urllib.request.build_opener(Stay).open(url, timeout=60) as answer:
+        with urllib.request.urlopen(urllib.request.Request(url, body, headers), timeout=60) as answer:
             return answer.status, answer.read().decode()
     except urllib.error.HTTPError as error:
         return error.code, error.read().decode()
+
+
+def pressed(link):
+    """The same of the button on the page of a one-time link."""
+    origin, code = link.split("/login?code=")
+    headers = {"Content-Type": "application/json", "Origin": origin}
+    return opened(origin + "/api/v1/login", json.dumps({"code": code}).encode(), **headers)
 
 
 class FirstStepsTest(unittest.TestCase):
@@ -50,10 +54,14 @@ class FirstStepsTest(unittest.TestCase):
             self.assertEqual((made.returncode, made.stderr), (0, ""))
             url = made.stdout.strip()
             self.assertRegex(url, r"^http://127\.0\.0\.1:\d+/login\?code=\S{40,}$")
-            self.assertEqual(opened(url)[0], 303)
-            status, page = opened(url)
+            for _ in range(2):  # a preview uses nothing up
+                status, page = opened(url)
+                self.assertEqual(status, 200)
+                self.assertIn('<div id="cockpit">', page, "the cockpit, with a button")
+            self.assertEqual(pressed(url)[0], 200)
+            status, refusal = pressed(url)
             self.assertEqual(status, 401)
-            self.assertIn('<div id="cockpit">', page, "the cockpit, which says what to do")
+            self.assertIn("make a new one", refusal)
 
     def test_a_port_that_is_taken_is_one_sentence_and_is_not_replaced(self):
         taken, address = taken_port()

@@ -253,17 +253,15 @@ class TlsTest(unittest.TestCase):
             url = station.post("/api/v1/login-links")["url"]
             self.assertTrue(url.startswith(f"https://{host}:{port}/login"), url)
 
-            class Stay(urllib.request.HTTPRedirectHandler):
-                def redirect_request(self, *_):
-                    return None
-            opener = urllib.request.build_opener(
-                Stay, urllib.request.HTTPSHandler(context=ssl.create_default_context(
-                    cafile=str(place.data / "tls" / "lab-ca.crt"))))
-            with self.assertRaises(urllib.error.HTTPError) as redirected:
-                opener.open(url)
-            cookie = redirected.exception.headers["Set-Cookie"]
+            opener = urllib.request.build_opener(urllib.request.HTTPSHandler(context=ssl.create_default_context(
+                cafile=str(place.data / "tls" / "lab-ca.crt"))))
+            origin, code = url.split("/login?code=")
+            headers = {"Content-Type": "application/json", "Origin": origin}
+            signed_in = opener.open(urllib.request.Request(f"{origin}/api/v1/login", json.dumps({"code": code}).encode(),
+                                                           headers))
+            cookie = signed_in.headers["Set-Cookie"]
             self.assertIn("; Secure", cookie)
-            self.assertIn("max-age=", redirected.exception.headers["Strict-Transport-Security"])
+            self.assertIn("max-age=", signed_in.headers["Strict-Transport-Security"])
 
             def stop_all(origin):
                 request = urllib.request.Request(f"https://{host}:{port}/api/v1/emergency-stop", method="POST")

@@ -176,6 +176,7 @@ export class Api {
   robot_controller = (robot_id: string) => this.ask<ControllerInForce>('GET', past(robot_id, 'controller', {}));
 
   log_in = (user: string, password: string) => this.ask<Me>('POST', '/login', { user, password });
+  redeem_link = (code: string) => this.ask<Me>('POST', '/login', { code });
   log_out = () => this.ask<object>('POST', '/logout');
   me = () => this.ask<Me>('GET', '/me');
   users = async () => (await this.ask<{ users: User[] }>('GET', '/users')).users;

@@ -10,6 +10,7 @@ import { follow_address } from './route';
 import { Session } from './session';
 import { show_in_tab } from './tab';
 import { Cockpit, open_view } from './views/cockpit';
+import { link_code } from './views/signed_out';
 
 const session = new Session();
 follow_address(window);
@@ -24,6 +25,6 @@ follow_build({
   served_html,
   set_timer: (callback, delay_ms) => setTimeout(callback, delay_ms),
 });
-session.start();
+if (link_code() === null) session.start(); // the page of a link shows no cockpit before it is redeemed
 show_in_tab(document, session);
 render(<Cockpit session={session} />, document.getElementById('cockpit') as HTMLElement);

@@ -37,6 +37,8 @@ export const kReasons: Record<string, string> = {
   other_boot: 'The robot restarted in between.',
   not_permitted: 'Your role does not allow that.',
   wrong_credentials: 'The user or the password is wrong.',
+  bad_link:
+    'This link is no longer valid: it was used, or is older than 10 minutes. On the station’s machine rheonaut login-link --data FOLDER makes a new one.',
   no_credential: 'This page is signed out.',
   wrong_token: 'The station does not know this token any more.',
 };

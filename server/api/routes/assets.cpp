@@ -121,21 +121,4 @@ http::Response page_response(const http::Request& request) {
   return http::problem(404, "there is nothing at this path", "unknown_path");
 }
 
-http::Response old_link_response(http::Request request) {
-  const base::EmbeddedFile* cockpit = cockpit_file("/index.html");
-  if (cockpit == nullptr) {
-    return http::html_response(
-        401,
-        "<!doctype html><title>Rheonaut</title><p>This link was used already, or is older than 10 minutes. On the "
-        "station's machine, `rheonaut login-link --data FOLDER` makes a new one.");
-  }
-  request.headers.erase("if-none-match");
-  http::Response response = asset_response(request, *cockpit);
-  response.status = 401;
-  std::erase_if(response.headers,
-                [](const auto& field) { return field.first == "ETag" || field.first == "Cache-Control"; });
-  response.headers.emplace_back("Cache-Control", "no-store");
-  return response;
-}
-
 }  // namespace server::api

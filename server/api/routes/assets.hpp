@@ -23,8 +23,4 @@ http::Response asset_response(const http::Request& request, const base::Embedded
 // The cockpit's file at request.path ("/" is index.html); 404 when there is none, 405 for anything but GET.
 http::Response page_response(const http::Request& request);
 
-// 401 for a browser whose link is no longer valid: the cockpit, which finds itself at /login and says what to do, or
-// the same in a plain page where the cockpit was not built.
-http::Response old_link_response(http::Request request);
-
 }  // namespace server::api

@@ -30,9 +30,31 @@ json me_json(const std::string& user, const std::string& actor, identity::Scopes
   return {{"actor", actor}, {"user", user}, {"role", text(scopes.role())}, {"scopes", text(scopes)}};
 }
 
+http::Response signed_in(AccountRoutes parts, const std::string& secret) {
+  const auto caller = parts.auth.caller_of_session(secret);
+  if (!caller) return http::problem(401, "the user was removed just now", "wrong_credentials");
+  http::Response response = http::json_response(200, me_json(caller->user, caller->actor, caller->scopes));
+  response.headers.emplace_back("Set-Cookie", parts.auth.cookie(secret, parts.facts.is_secure()));
+  return response;
+}
+
+http::Response redeem_link(AccountRoutes parts, const http::Request& request, const Members& body) {
+  if (const auto alone = body.only({"code"}); !alone) return http::problem(alone.error());
+  const auto code = body.text("code", {0, kMaxWordBytes});
+  if (!code) return http::problem(code.error());
+  const auto secret = parts.auth.log_in(*code, request.peer, request.header("user-agent"));
+  if (secret) return signed_in(parts, *secret);
+  return http::problem(
+      401,
+      "this link was used already, or is older than 10 minutes: make a new one with rheonaut login-link "
+      "on the station's machine",
+      "bad_link");
+}
+
 http::Answer log_in(AccountRoutes parts, http::Request request) {
-  const auto body = Members::parse(request.body, {"user", "password"});
+  const auto body = Members::parse(request.body, {"user", "password", "code"});
   if (!body) co_return http::problem(body.error());
+  if (body->has("code")) co_return redeem_link(parts, request, *body);
   const auto user = body->text("user", text_bytes("LoginBody.user"));
   if (!user) co_return http::problem(user.error());
   const auto password = body->text("password", text_bytes("LoginBody.password"));
@@ -40,11 +62,7 @@ http::Answer log_in(AccountRoutes parts, http::Request request) {
   identity::LoginAttempt attempt{*user, *password, request.peer, request.header("user-agent")};
   const auto secret = co_await parts.logins.log_in(std::move(attempt));
   if (!secret) co_return login_refused(secret.error());
-  const auto caller = parts.auth.caller_of_session(*secret);
-  if (!caller) co_return http::problem(401, "the user was removed just now", "wrong_credentials");
-  http::Response response = http::json_response(200, me_json(caller->user, caller->actor, caller->scopes));
-  response.headers.emplace_back("Set-Cookie", parts.auth.cookie(*secret, parts.facts.is_secure()));
-  co_return response;
+  co_return signed_in(parts, *secret);
 }
 
 http::Answer log_out(AccountRoutes parts, http::Request request) {

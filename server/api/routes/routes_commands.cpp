@@ -284,7 +284,8 @@ int stop_status(const station::CommandRecord& record) { return was_accepted(reco
 
 constexpr const char* kStopNotStored =
     "the stop is kept and goes to the robot before anything else, but the station's disk does not take it: if the "
-    "station ends before it can be stored, it is lost. Keep the station running, make room on its disk, stop again";
+    "station ends before it can be stored, it is lost. Keep the station running, do what GET /api/v1/recording says, "
+    "stop again";
 
 // SAFETY: a key that is none does not keep a stop from being carried out.
 station::StopRequest stop_request(const http::Request& request) {

@@ -42,20 +42,10 @@ http::Answer make_login_link(StationRoutes parts, http::Request request) {
       201, {{"url", url}, {"expires_at_us", parts.clock.utc_us() + identity::kLoginCodeValidity.count()}});
 }
 
-http::Answer log_in(StationRoutes parts, http::Request request) {
-  if (request.method == "HEAD") {  // a preview of the link must not use the code up
-    http::Response response = http::problem(405, "HEAD is not possible here", "method_not_allowed");
-    response.headers.emplace_back("Allow", "GET");
-    co_return response;
-  }
-  const auto session = parts.auth.log_in(request.query["code"], request.peer, request.header("user-agent"));
-  if (!session) {
-    co_return old_link_response(std::move(request));
-  }
-  http::Response response = http::html_response(303, "");
-  response.headers.emplace_back("Location", "/");
-  response.headers.emplace_back("Set-Cookie", parts.auth.cookie(*session, parts.facts.is_secure()));
-  co_return response;
+// The code is redeemed by a press on the page alone, not by a picture, a preview or a prefetch of the link.
+http::Answer show_login(StationRoutes, http::Request request) {
+  request.path = "/";
+  co_return page_response(request);
 }
 
 http::Answer live_without_upgrade(StationRoutes, http::Request) {
@@ -81,7 +71,7 @@ void add_station_routes(http::Router& router, StationRoutes parts) {
                                     http::Answer (*answer)(StationRoutes, http::Request)) {
     router.add({"GET", pattern, needs, std::move(query), with(parts, answer)});
   };
-  add("/login", identity::Scope::anyone, {"code"}, log_in);
+  add("/login", identity::Scope::anyone, {"code"}, show_login);
   add("/live", identity::Scope::read, {}, live_without_upgrade);
   add("/api/v1/station", identity::Scope::read, {}, get_station);
   add("/api/v1/openapi.yaml", identity::Scope::read, {}, get_openapi);

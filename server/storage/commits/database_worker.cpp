@@ -64,7 +64,8 @@ std::string DatabaseWorker::write_now(const WriteBatch& commit) {
     is_written_ = !problem.empty();
     return problem;
   } catch (const std::exception& error) {  // disk full, locked, unreadable: never a reason to end the emergency stop
-    return write_problem(error);
+    std::string lost = kept_->hold() ? std::string{} : kept_->problem(database_->handle());
+    return lost.empty() ? write_problem(error) : lost;
   }
 }
 

@@ -163,7 +163,19 @@ bool means_damage(const std::exception& error) {
 
 std::string write_problem(const std::exception& error) {
   if (means_damage(error)) return fmt::format("{}: {}", runtime::text_of(error), kDamageRemedy);
-  return fmt::format("{}. Make room on the disk, or end the program that holds the file", runtime::text_of(error));
+  const char* remedy = "The kernel's log (dmesg) may say more";
+  switch (code_of(error)) {
+    case SQLITE_FULL: remedy = "Make room on the disk"; break;
+    case SQLITE_IOERR:
+      remedy = "Make room on the disk; if it has room, the kernel's log (dmesg) says what fails";
+      break;
+    case SQLITE_BUSY:
+    case SQLITE_LOCKED: remedy = "End the program that holds the file"; break;
+    case SQLITE_READONLY:
+    case SQLITE_CANTOPEN: remedy = "Let the station's user write the file and its folder"; break;
+    default: break;
+  }
+  return fmt::format("{}. {}", runtime::text_of(error), remedy);
 }
 
 std::string find_damage(SQLite::Database& database) {

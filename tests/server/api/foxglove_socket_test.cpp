@@ -27,7 +27,8 @@ class FoxgloveSocketTest : public ApiTest {
     return url.substr(url.find("/foxglove"));
   }
   std::unique_ptr<Page> open(const std::string& target, const std::string& headers = kProtocol) {
-    return std::make_unique<Page>(clock, port(), headers, "127.0.0.1", [] {}, target);
+    return std::make_unique<Page>(
+        clock, port(), headers, "127.0.0.1", [] {}, target);
   }
   static std::string ticket_of(const std::string& link) { return link.substr(link.find("ticket=") + 7); }
   json receive(Page& page, const std::string& op) {
@@ -81,7 +82,7 @@ TEST_F(FoxgloveSocketTest, ATicketIsOfNoUseElsewhere) {
   EXPECT_TRUE(open("/live", "Cookie: rheonaut_session_fedcba9876543210=" + ticket + "\r\n")
                   ->answer.starts_with("HTTP/1.1 401 "));
   EXPECT_TRUE(open("/api/v1/robots", bearer)->answer.starts_with("HTTP/1.1 401 "));
-  EXPECT_TRUE(open("/login?code=" + ticket, "")->answer.starts_with("HTTP/1.1 401 "));
+  EXPECT_EQ(ask("POST", "/api/v1/login", {{"code", ticket}}).status, 401);
   EXPECT_TRUE(open("/foxglove?ticket=" + ticket)->open()) << "all of that has not used it up";
 }
 

@@ -34,6 +34,16 @@ TEST_F(HttpHeadTest, FoldedLinesAndTwoHostsAre400) {
   EXPECT_TRUE(get("/api/v1/station").starts_with("HTTP/1.1 200 "));
 }
 
+// Two lengths, or a length and chunks, read differently by two programs on the way, hide a second request.
+TEST_F(HttpHeadTest, TwoLengthsAre400) {
+  for (const char* lengths : {"Content-Length: 3\r\nContent-Length: 5\r\n", "Content-Length: 3, 5\r\n",
+                              "Content-Length: 3\r\nTransfer-Encoding: chunked\r\n",
+                              "Transfer-Encoding: chunked\r\nContent-Length: 3\r\n", "Transfer-Encoding: gzip\r\n"}) {
+    const std::string answer = talk(head("POST /api/v1/runs", lengths) + "{}\r\n0\r\n\r\n");
+    EXPECT_TRUE(answer.starts_with("HTTP/1.1 400 ")) << lengths << answer;
+  }
+}
+
 // However the head is cut into pieces on its way.
 TEST_F(HttpHeadTest, AHeadInPiecesIsReadAsOne) {
   for (const std::size_t piece : {1U, 7U, 100U}) {
@@ -102,8 +112,12 @@ TEST_F(HttpHeadTest, AMemberThatIsGivenTwiceIs400) {
 
 // Were it set again later, the answer to one tab could put an old session in the place of the newer one of another tab.
 TEST_F(HttpHeadTest, TheCookieIsSetBySigningInAndByNothingElse) {
-  const std::string url = login_url();
-  const std::string in = get(url.substr(url.find("/login")));
+  const std::string url = login_url(), body = json{{"code", url.substr(url.find("code=") + 5)}}.dump();
+  const std::string in =
+      talk(head("POST /api/v1/login", fmt::format("Connection: close\r\nContent-Type: application/json"
+                                                  "\r\nContent-Length: {}\r\n",
+                                                  body.size())) +
+           body);
   const std::string name = "rheonaut_session_fedcba9876543210=";
   const auto begin = in.find("Set-Cookie: " + name) + 12;
   ASSERT_LT(begin, in.size()) << in;

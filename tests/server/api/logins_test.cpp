@@ -164,8 +164,9 @@ TEST_F(LoginsTest, WrongUnknownAndDisabledGetOneAnswerForOnePrice) {
 }
 
 TEST_F(LoginsTest, BodiesThatAreNoneAreRefused) {
-  for (const char* body : {"", "[]", "{", R"({"user":"anna"})", R"({"user":"anna","password":7})",
-                           R"({"user":"anna","password":"x","more":1})"}) {
+  for (const char* body :
+       {"", "[]", "{", R"({"user":"anna"})", R"({"user":"anna","password":7})",
+        R"({"user":"anna","password":"x","more":1})", R"({"code":7})", R"({"user":"anna","code":"x"})"}) {
     const Answered refused = ask("POST", "/api/v1/login", json::parse(body, nullptr, false));
     EXPECT_GE(refused.status, 400) << body;
     EXPECT_LT(refused.status, 500) << body;

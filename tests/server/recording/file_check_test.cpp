@@ -167,9 +167,7 @@ TEST_F(FileCheckTest, AFileThatWasJustBegunIsBegunAgain) {
 }
 
 TEST_F(FileCheckTest, ATruncatedFileIsRefused) {
-  {
-    const storage::Database database{path_};
-  }
+  { const storage::Database database{path_}; }
   fs::resize_file(path_, fs::file_size(path_) - 4096);
   const std::string file = content(path_);
   EXPECT_THAT(refusal(), HasSubstr("it is truncated"));
@@ -179,9 +177,7 @@ TEST_F(FileCheckTest, ATruncatedFileIsRefused) {
 }
 
 TEST_F(FileCheckTest, AHeaderWithoutAPageSizeIsDamaged) {
-  {
-    const storage::Database database{path_};
-  }
+  { const storage::Database database{path_}; }
   overwrite(16, std::string{"\x0f\xff", 2});
   EXPECT_THAT(refusal(), HasSubstr("its header is damaged; stop the station, run rheonaut verify, restore a backup"));
 }
@@ -200,9 +196,7 @@ TEST_F(FileCheckTest, FindsADamagedPageAndARowWithoutItsOther) {
 }
 
 TEST_F(FileCheckTest, DamageAtRunTimeSaysWhatToDoAndDoesNotAskForRoom) {
-  {
-    const storage::Database database{path_};
-  }
+  { const storage::Database database{path_}; }
   const std::int64_t page = number("SELECT rootpage FROM sqlite_master WHERE name = 'sample'");
   overwrite(static_cast<std::size_t>((page - 1) * 4096), std::string(100, '\xff'));
   start();
@@ -217,10 +211,35 @@ TEST_F(FileCheckTest, DamageAtRunTimeSaysWhatToDoAndDoesNotAskForRoom) {
   EXPECT_EQ(durable_next_seq_, 0U);
 }
 
-TEST_F(FileCheckTest, AFullDiskAsksForRoom) {
-  const SQLite::Exception full{"database or disk is full", SQLITE_FULL};
-  EXPECT_THAT(storage::write_problem(full), HasSubstr("Make room on the disk"));
-  EXPECT_FALSE(storage::means_damage(full));
+TEST_F(FileCheckTest, EachCauseHasItsOwnRemedy) {
+  const struct {
+    int code;
+    const char* remedy;
+  } cases[] = {{SQLITE_FULL, "Make room on the disk"},
+               {SQLITE_BUSY, "End the program that holds the file"},
+               {SQLITE_READONLY, "Let the station's user write the file"},
+               {SQLITE_CANTOPEN, "Let the station's user write the file"},
+               {SQLITE_NOMEM, "dmesg"}};
+  for (const auto& [code, remedy] : cases) {
+    const SQLite::Exception error{"a text of SQLite", code};
+    EXPECT_FALSE(storage::means_damage(error));
+    const std::string problem = storage::write_problem(error);
+    EXPECT_THAT(problem, HasSubstr(remedy));
+    EXPECT_EQ(problem.find("room") != std::string::npos, code == SQLITE_FULL) << problem;
+  }
+}
+
+TEST_F(FileCheckTest, AFileThatIsNotThereIsTheCauseThoughAnotherProgramHoldsItToo) {
+  start();
+  TestRobot robot;
+  connect(robot);
+  SQLite::Database other{path_.string(), SQLite::OPEN_READWRITE};
+  other.exec("BEGIN IMMEDIATE");
+  std::filesystem::rename(path_, std::filesystem::path{path_}.concat(".elsewhere"));
+  make(robot, 200);
+  clock_.run_for(3s);
+  EXPECT_THAT(recorder_->problem(), HasSubstr("station.sqlite was removed, renamed or replaced"));
+  EXPECT_EQ(durable_next_seq_, 0U);
 }
 
 }  // namespace

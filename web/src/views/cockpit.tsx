@@ -10,7 +10,7 @@ import { TopBar } from '../parts/top_bar';
 import { format, go_to, route } from '../route';
 import type { Session } from '../session';
 import { ViewLoader } from './loader';
-import { SignedOut } from './signed_out';
+import { link_code, SignedOut } from './signed_out';
 import { kViews, view_named, type View } from './table';
 
 const loader = new ViewLoader((callback, delay_ms) => setTimeout(callback, delay_ms));
@@ -25,7 +25,7 @@ export function open_view(key: string): boolean {
 export function Cockpit({ session }: { session: Session }) {
   const name = useComputed(() => route.value.view).value;
   const present = useMemo(() => present_of(session), [session]);
-  if (session.phase.value === 'signed_out') return <SignedOut session={session} />;
+  if (session.phase.value === 'signed_out' || link_code() !== null) return <SignedOut session={session} />;
   const view = view_named(name);
   const module = view ? loader.of(view).value.module : null;
   const View = module?.default;

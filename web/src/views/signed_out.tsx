@@ -9,15 +9,34 @@ const MakeLink = () => (
   </p>
 );
 
-// The station answers a link that is no longer valid with this page, at the link's own address.
-function OldLink() {
+// The code of the one-time link at which the page was opened.
+export const link_code = () =>
+  location.pathname === '/login' ? new URLSearchParams(location.search).get('code') : null;
+
+// Only a press redeems the link; opening it does not.
+function UseLink({ session, code }: { session: Session; code: string }) {
+  const pending = useSignal(false);
+  const error = useSignal('');
+  const redeem = async () => {
+    pending.value = true;
+    try {
+      await session.api.redeem_link(code);
+      location.replace('/');
+    } catch (failure) {
+      error.value = failure instanceof Error ? failure.message : String(failure);
+      pending.value = false;
+    }
+  };
   return (
     <>
-      <h1>This link is no longer valid</h1>
-      <p>
-        A link signs one browser in, once, and only within 10 minutes. On the station’s machine this makes a new one:
+      <h1>Sign this browser in</h1>
+      <p>The link works once, within 10 minutes, and signs in as admin.</p>
+      <button id="use-link" class="primary" disabled={pending.value} onClick={() => void redeem()}>
+        Sign in with this link
+      </button>
+      <p id="link-error" class="sign-in-error" role="alert">
+        {error.value}
       </p>
-      <MakeLink />
     </>
   );
 }
@@ -40,13 +59,14 @@ export function SignedOut({ session }: { session: Session }) {
   const password = useSignal('');
   const pending = useSignal(false);
   const error = useSignal('');
+  const code = link_code();
 
   const sign_in = async () => {
     pending.value = true;
     error.value = '';
     try {
       await session.log_in(user.value.trim(), password.value);
-      if (location.pathname === '/login') history.replaceState(null, '', '/'); // a reload does not ask for the old link
+      if (code !== null) location.replace('/'); // a reload does not ask for the link
     } catch (failure) {
       error.value = failure instanceof Error ? failure.message : String(failure);
       password.value = '';
@@ -56,7 +76,7 @@ export function SignedOut({ session }: { session: Session }) {
 
   return (
     <main class="signed-out">
-      {location.pathname === '/login' ? <OldLink /> : <NoLink />}
+      {code === null ? <NoLink /> : <UseLink session={session} code={code} />}
       <form
         aria-label="Sign in"
         onSubmit={(event) => {
