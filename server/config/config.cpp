@@ -7,6 +7,7 @@
 #include <toml++/toml.h>
 #include <algorithm>
 #include <array>
+#include <cerrno>
 #include <cstdlib>
 #include <fstream>
 #include <iterator>
@@ -19,6 +20,7 @@
 #include "base/toml_text.hpp"
 #include "base/toml_value.hpp"
 #include "server/config/endpoint.hpp"
+#include "server/runtime/private_file.hpp"
 
 namespace server::config {
 namespace {
@@ -320,10 +322,12 @@ Config parse_config(const std::string& text, const std::string& name) {
 Config load_config(const ConfigFlags& flags) {
   Config config;
   if (flags.file) {
-    if (!std::filesystem::is_regular_file(*flags.file)) {
+    std::error_code error;
+    if (!std::filesystem::is_regular_file(*flags.file, error) && error != std::errc::permission_denied) {
       base::throw_invalid("config file '", flags.file->string(), "' does not exist");
     }
     std::ifstream in{*flags.file, std::ios::binary};
+    if (!in) base::throw_invalid("cannot read the config file: ", runtime::denial(*flags.file, errno));
     const std::string text{std::istreambuf_iterator<char>{in}, {}};
     if (!in) base::throw_invalid("config file '", flags.file->string(), "' cannot be read");
     ConfigFile file{text, flags.file->string()};

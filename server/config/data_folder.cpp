@@ -46,7 +46,12 @@ std::filesystem::path lock_file(const std::filesystem::path& folder) { return fo
 std::optional<FolderLock> FolderLock::try_take(const std::filesystem::path& folder) {
   const auto path = lock_file(folder);
   const int file = open(path.c_str(), O_RDWR | O_CREAT | O_NOFOLLOW | O_CLOEXEC, 0600);
-  if (file < 0) throw std::runtime_error{fmt::format("cannot open '{}': {}", path.string(), std::strerror(errno))};
+  if (file < 0) {
+    const int error = errno;
+    const bool is_usable = eaccess(folder.c_str(), W_OK | X_OK) == 0;
+    throw std::runtime_error{
+        fmt::format("cannot open '{}': {}", path.string(), runtime::denial(is_usable ? path : folder, error))};
+  }
   if (flock(file, LOCK_EX | LOCK_NB) != 0) {
     close(file);
     return std::nullopt;
@@ -72,7 +77,8 @@ void make_data_folder(const std::filesystem::path& path) {
   std::error_code error;
   const bool made = std::filesystem::create_directories(path, error);
   if (error)
-    throw std::runtime_error{fmt::format("cannot make the data folder '{}': {}", path.string(), error.message())};
+    throw std::runtime_error{
+        fmt::format("cannot make the data folder '{}': {}", path.string(), runtime::denial(path, error.value()))};
   if (made) std::filesystem::permissions(path, std::filesystem::perms::owner_all);
   runtime::require_own_folder(path);
 }

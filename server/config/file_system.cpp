@@ -25,7 +25,7 @@ std::string unsuitable_file_system(const fs::path& folder) {
   std::error_code ignored;
   fs::path there = fs::absolute(folder, ignored);
   while (!fs::exists(there, ignored) && there.has_relative_path()) there = there.parent_path();
-  struct statfs about {};
+  struct statfs about{};
   if (::statfs(there.c_str(), &about) != 0) return {};
   return unsuitable_file_system(static_cast<std::uint64_t>(about.f_type));
 }

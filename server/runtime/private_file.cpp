@@ -20,7 +20,7 @@ constexpr const char* kServiceUser = "rheonaut";
 constexpr std::size_t kMaxSecretBytes = 64 * 1024;
 
 [[noreturn]] void cannot(const char* what, const fs::path& file) {
-  throw std::runtime_error{fmt::format("cannot {} {}: {}", what, file.string(), std::strerror(errno))};
+  throw std::runtime_error{fmt::format("cannot {} {}: {}", what, file.string(), denial(file, errno))};
 }
 
 // By number where it has no name.
@@ -84,9 +84,6 @@ std::optional<std::string> read_private(const fs::path& file) {
   if (opened.number < 0 && errno == ELOOP)
     throw std::runtime_error{
         fmt::format("'{0}' is a link, which could lead to a file of somebody else; type: rm '{0}'", file.string())};
-  if (opened.number < 0 && errno == EACCES)
-    throw std::runtime_error{
-        fmt::format("'{0}' may not be read by {1}; type: sudo chown {1} '{0}'", file.string(), name_of(::geteuid()))};
   if (opened.number < 0) cannot("read", file);
   struct stat status{};
   if (::fstat(opened.number, &status) != 0) cannot("look at", file);
@@ -107,6 +104,23 @@ std::optional<std::string> read_private(const fs::path& file) {
   if (size < 0) cannot("read", file);
   content.resize(static_cast<std::size_t>(size));
   return content;
+}
+
+std::string denial(const fs::path& path, int error) {
+  if (error != EACCES && error != EPERM) return std::strerror(error);
+  const fs::path asked = fs::absolute(path).lexically_normal();
+  fs::path denied = asked;
+  struct stat status{};
+  while (::stat(denied.c_str(), &status) != 0 && denied.has_relative_path()) denied = denied.parent_path();
+  const std::string owner = name_of(status.st_uid), self = name_of(::geteuid());
+  const unsigned mode = status.st_mode & 07777U;
+  if (owner == self) {
+    return fmt::format("'{0}' has the mode {1:04o}; type: chmod u+rwX '{0}'", denied.string(), mode);
+  }
+  const std::string give_away =
+      denied == asked ? fmt::format(", or type: sudo chown -R {} '{}'", self, denied.string()) : std::string{};
+  return fmt::format("'{}' belongs to {} (mode {:04o}), and this program runs as {}; run it as {}{}", denied.string(),
+                     owner, mode, self, owner, give_away);
 }
 
 void require_own_folder(const fs::path& folder) {

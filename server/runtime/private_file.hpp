@@ -26,4 +26,8 @@ std::optional<std::string> read_private(const std::filesystem::path& file);
 // may be written by all users; warns when its group may write.
 void require_own_folder(const std::filesystem::path& folder);
 
+// Why a call on the path failed with this errno. Where it is a matter of rights: whose the path is, or the folder that
+// keeps this program from it, and what to do.
+std::string denial(const std::filesystem::path& path, int error);
+
 }  // namespace server::runtime

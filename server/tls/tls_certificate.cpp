@@ -5,10 +5,12 @@
 #include <fmt/format.h>
 #include <openssl/pem.h>
 
+#include <cerrno>
 #include <ctime>
 #include <stdexcept>
 
 #include "base/tls/public_key.hpp"
+#include "server/runtime/private_file.hpp"
 
 namespace server::tls {
 namespace fs = std::filesystem;
@@ -16,9 +18,11 @@ namespace fs = std::filesystem;
 namespace {
 
 base::Openssl<BIO> open(const fs::path& file) {
+  errno = 0;
   base::Openssl<BIO> bio{BIO_new_file(file.c_str(), "r")};
   if (bio) return bio;
-  throw std::runtime_error{fmt::format("cannot read '{}': {}", file.string(), base::openssl_error("no reason"))};
+  const std::string denial = errno == EACCES ? runtime::denial(file, errno) : base::openssl_error("no reason");
+  throw std::runtime_error{fmt::format("cannot read '{}': {}", file.string(), denial)};
 }
 
 // A key behind a password would ask for it on the terminal, and the station would wait.

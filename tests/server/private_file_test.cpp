@@ -101,6 +101,23 @@ TEST_F(PrivateFile, AFolderOfAnotherUserIsNoDataFolder) {
   EXPECT_EQ(refusal([&] { config::DataFolder{folder}; }), "");
 }
 
+TEST_F(PrivateFile, AFolderOfRootIsRefusedToOthersWithItsOwnerAndTheLineToType) {
+  if (::geteuid() != 0) GTEST_SKIP() << "only root can be somebody else";
+  std::ofstream{folder / "closed.toml"} << "x";
+  ASSERT_EQ(::chmod((folder / "closed.toml").c_str(), 0600), 0);
+  ASSERT_EQ(::seteuid(kNobody), 0);
+  const std::string said = refusal([&] { config::DataFolder{folder}; });
+  const std::string inside = refusal([&] { config::DataFolder{folder / "new"}; });
+  const std::string unread = runtime::denial(folder / "closed.toml", EACCES);
+  ASSERT_EQ(::seteuid(0), 0);
+  const std::string owner =
+      "'" + folder.string() + "' belongs to root (mode 0700), and this program runs as nobody; run it as root";
+  EXPECT_EQ(said, "cannot open '" + folder.string() + "/rheonaut.lock': " + owner +
+                      ", or type: sudo chown -R nobody '" + folder.string() + "'");
+  EXPECT_TRUE(inside.ends_with(owner)) << inside << ": what is not its own is not given away";
+  EXPECT_EQ(unread, owner);
+}
+
 TEST_F(PrivateFile, AFolderThatItsGroupMayWriteIsUsedWithAWarning) {
   ASSERT_EQ(::chmod(folder.c_str(), 0770), 0);
   const CapturedLog log;

@@ -3,13 +3,16 @@
 
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <boost/asio/experimental/awaitable_operators.hpp>
 #include <cctype>
+#include <cerrno>
 #include <map>
 
 #include "server/runtime/exceptions.hpp"
+#include "server/runtime/private_file.hpp"
 #include "server/storage/database/file_check.hpp"
 #include "server/storage/database/finished_file.hpp"
 
@@ -78,9 +81,10 @@ void remove_parts(const fs::path& folder, std::uint64_t store_id) {
 Result<void> check_room(const fs::path& path, const fs::path& database, std::uint64_t store_id) {
   std::error_code error;
   fs::create_directories(path.parent_path(), error);
-  if (error) {
+  if (error || ::eaccess(path.parent_path().c_str(), W_OK | X_OK) != 0) {
     return fail(ErrorCode::unavailable,
-                fmt::format("the folder '{}' cannot be made: {}", path.parent_path().string(), error.message()));
+                fmt::format("no backup can be written into '{}': {}", path.parent_path().string(),
+                            runtime::denial(path.parent_path(), error ? error.value() : errno)));
   }
   remove_parts(path.parent_path(), store_id);
   if (fs::exists(path)) return fail(ErrorCode::conflict, fmt::format("'{}' is there already", path.string()));

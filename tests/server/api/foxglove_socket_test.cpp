@@ -27,8 +27,7 @@ class FoxgloveSocketTest : public ApiTest {
     return url.substr(url.find("/foxglove"));
   }
   std::unique_ptr<Page> open(const std::string& target, const std::string& headers = kProtocol) {
-    return std::make_unique<Page>(
-        clock, port(), headers, "127.0.0.1", [] {}, target);
+    return std::make_unique<Page>(clock, port(), headers, "127.0.0.1", [] {}, target);
   }
   static std::string ticket_of(const std::string& link) { return link.substr(link.find("ticket=") + 7); }
   json receive(Page& page, const std::string& op) {

@@ -167,7 +167,9 @@ TEST_F(FileCheckTest, AFileThatWasJustBegunIsBegunAgain) {
 }
 
 TEST_F(FileCheckTest, ATruncatedFileIsRefused) {
-  { const storage::Database database{path_}; }
+  {
+    const storage::Database database{path_};
+  }
   fs::resize_file(path_, fs::file_size(path_) - 4096);
   const std::string file = content(path_);
   EXPECT_THAT(refusal(), HasSubstr("it is truncated"));
@@ -177,7 +179,9 @@ TEST_F(FileCheckTest, ATruncatedFileIsRefused) {
 }
 
 TEST_F(FileCheckTest, AHeaderWithoutAPageSizeIsDamaged) {
-  { const storage::Database database{path_}; }
+  {
+    const storage::Database database{path_};
+  }
   overwrite(16, std::string{"\x0f\xff", 2});
   EXPECT_THAT(refusal(), HasSubstr("its header is damaged; stop the station, run rheonaut verify, restore a backup"));
 }
@@ -196,7 +200,9 @@ TEST_F(FileCheckTest, FindsADamagedPageAndARowWithoutItsOther) {
 }
 
 TEST_F(FileCheckTest, DamageAtRunTimeSaysWhatToDoAndDoesNotAskForRoom) {
-  { const storage::Database database{path_}; }
+  {
+    const storage::Database database{path_};
+  }
   const std::int64_t page = number("SELECT rootpage FROM sqlite_master WHERE name = 'sample'");
   overwrite(static_cast<std::size_t>((page - 1) * 4096), std::string(100, '\xff'));
   start();
