@@ -290,6 +290,23 @@ TEST_F(WayBackTest, ComesToRestWhenItIsPaused) {
   until(id, ExperimentState::done, 90s);
 }
 
+// SAFETY: what is late in the same moment takes the pause not away.
+TEST_F(WayBackTest, APauseHoldsAlsoWhereSomethingIsLateMeanwhile) {
+  go_back();
+  robot->redial = false;
+  ASSERT_TRUE(wait_for(experiments->pause(id, {"anna", "", 0})));
+  robot->cut();
+  leave("anna");
+  clock.run_for(3s);
+  robot->redial = true;
+  robot->dial(*listener);
+  come("anna");
+  clock.run_for(20s);
+  EXPECT_EQ(view(id).experiment.state, ExperimentState::paused);
+  EXPECT_EQ(view(id).experiment.reason, "requested") << detail();
+  EXPECT_EQ(duty(), 0);
+}
+
 TEST_F(WayBackTest, IsInterruptedLikeAStep) {
   go_back();
   lose_link(700ms);

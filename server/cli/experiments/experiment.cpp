@@ -65,7 +65,8 @@ std::string progress_line(const json& experiment) {
   if (state == "waiting" && !experiment.at("waits_for").is_null()) {
     return "waits: " + text_of(experiment.at("waits_for_detail"));
   }
-  if (state == "paused") return "paused: " + text_of(experiment.at("detail"));
+  const std::string why = text_of(experiment.at("detail"));
+  if (state == "paused" || (state == "running" && !why.empty())) return fmt::format("{}: {}", state, why);
   if (!experiment.at("activity").is_null()) return fmt::format("{}: {}", state, text_of(experiment.at("activity")));
   if (progress.is_null()) return state;
   return fmt::format("{}: run {} of {}, step {} of {}, {:.0f} of {:.0f} s", state, progress.at("run").get<int>(),
@@ -161,7 +162,7 @@ json watch(const StationClient& station, std::int64_t id) {
     }
     // SAFETY: who presses a key while the robot is about to move again decides that it does not.
     const bool was_shown = std::exchange(is_shown, may_be_paused);
-    if (is_pressed && was_shown && may_be_paused) station.ask("POST", one + "/pause", json::object());
+    if (is_pressed && was_shown) station.ask("POST", one + "/pause", json::object());
     if (!interrupt.comes_within_ms(kWatch_ms)) continue;
     if (is_interrupted || !is_ours) throw std::runtime_error{"interrupted; the experiment is still there"};
     is_interrupted = true;
@@ -270,8 +271,7 @@ constexpr const char* kWaits =
 
 std::string outcome_of(const json& experiment) {
   const auto state = experiment.at("state").get<std::string>();
-  const std::string why =
-      text_of(is_over(experiment) || state == "paused" ? experiment.at("detail") : experiment.at("waits_for_detail"));
+  const std::string why = text_of(experiment.at(state == "waiting" ? "waits_for_detail" : "detail"));
   return fmt::format("experiment {} ({}) is {}{}", experiment.at("experiment_id").get<std::int64_t>(),
                      experiment.at("name").get<std::string>(), state, why.empty() ? "" : ": " + why);
 }

@@ -67,8 +67,8 @@ class Conduct {
   void on_command(const station::CommandRecord& record);
   void on_event(const station::RobotEvent& event);
 
-  bool is_aborting() const { return abort_.has_value(); }
-  // SAFETY: a robot that moves is never called paused, also when it goes back within a pause.
+  bool is_aborting() const { return abort_ || (driver_ && driver_->is_ending()); }
+  // SAFETY: a robot that goes back within a pause is not called paused.
   bool is_paused() const { return pause_reason() != nullptr && !(driver_ && driver_->goes_back()); }
   const Abort* pause_reason() const;     // null: it is not paused, and does not go back
   const Conclusion* conclusion() const;  // of one with until that was not aborted: how it ended; else null

@@ -34,6 +34,11 @@ bool comes_before(const Experiment& a, const Experiment& b) {
   return a.place < b.place;
 }
 
+void give_reason(Experiment& experiment, const Abort* why) {  // null: it has none
+  experiment.reason = why == nullptr ? "" : why->reason;
+  experiment.detail = why == nullptr ? "" : why->detail;
+}
+
 }  // namespace
 
 Experiments::Experiments(const DriverParts& parts, storage::RecordingParts& recording, runtime::WorkerThread& maths,
@@ -289,10 +294,8 @@ void Experiments::note_states() {
     if (!is_other && !entry.is_changed) continue;
     entry.is_changed = false;
     if (is_other) {
-      const Abort* why = entry.conduct->pause_reason();
       entry.experiment.state = state;
-      entry.experiment.reason = why == nullptr ? "" : why->reason;
-      entry.experiment.detail = why == nullptr ? "" : why->detail;
+      give_reason(entry.experiment, entry.conduct->pause_reason());
     }
     changed.push_back(entry.experiment);
     publish(entry);
@@ -332,10 +335,8 @@ ExperimentView Experiments::summary_of(const Entry& entry) const {
   view.experiment.state = state_of(entry);
   if (!entry.conduct) return view;
   view.experiment.run_counts = storage::counts_of(entry.conduct->runs());
-  if (const Abort* why = entry.conduct->pause_reason()) {
-    view.experiment.reason = why->reason;
-    view.experiment.detail = why->detail;
-  }
+  const Abort* why = entry.conduct->pause_reason();
+  if (why != nullptr || view.experiment.state == ExperimentState::running) give_reason(view.experiment, why);
   const RunDriver* driver = entry.conduct->driver();
   if (driver == nullptr || storage::has_ended(view.experiment.state)) return view;
   view.progress = ExperimentProgress{

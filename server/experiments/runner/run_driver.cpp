@@ -283,8 +283,8 @@ asio::awaitable<void> RunDriver::send(FedCommand fed, std::uint64_t robot_now_us
   const bool is_unheard = sent ? is_late(*sent) : sent.error().reason == "not_connected";
   if (is_unheard) co_return interrupt(came_late(protocol::kind(fed.command)));
   const std::string why = sent ? sent->reason.empty() ? text(sent->state) : sent->reason : sent.error().detail;
-  abort({"command_refused",
-         fmt::format("step {}: {}: {}", line_.first_step + fed.step, protocol::kind(fed.command), why)});
+  const std::string whose = way_feed_ ? "the way back to 0" : fmt::format("step {}", line_.first_step + fed.step);
+  abort({"command_refused", fmt::format("{}: {}: {}", whose, protocol::kind(fed.command), why)});
 }
 
 void RunDriver::renew_lease() {

@@ -105,7 +105,8 @@ class RunDriver {
   // After run() has thrown: returns when no task of its own is left.
   boost::asio::awaitable<void> settle_tasks();
 
-  bool goes_back() const { return way_feed_.has_value(); }  // it moves, within its pause
+  bool goes_back() const { return way_feed_.has_value(); }  // within its pause, until it is at rest again
+  bool is_ending() const { return abort_.has_value(); }
   const Abort* pause_reason() const { return pause_ ? &pause_->shown : nullptr; }
   // By a person, or until one comes.
   const Abort* held_by() const { return pause_ && !pause_->ends_by_itself ? &pause_->why : nullptr; }
@@ -129,6 +130,7 @@ class RunDriver {
     bool is_resumed = false;
     bool ends_by_itself = false;     // an interruption
     std::int64_t goes_on_at_us = 0;  // steady; 0: not yet
+    bool goes_back = false;          // to make room: what is late meanwhile is a pause of its own
   };
 
   // Of an interruption that is over, by whatever way.
@@ -149,11 +151,12 @@ class RunDriver {
   boost::asio::awaitable<void> until_over_pause(std::uint64_t noticed_us);
   boost::asio::awaitable<void> check_travel(Place place);
   boost::asio::awaitable<bool> has_room_from_0(const TimeLine& rest, double position_m);
-  boost::asio::awaitable<bool> go_back();
+  boost::asio::awaitable<void> go_back();
   const CommandFeed& feed_now() const { return way_feed_ ? *way_feed_ : feed_; }
   boost::asio::awaitable<Rest> rest(bool ends_with_link);
   void go_on_from(Place place);
-  void count_interruption(Place place, std::int64_t since_us);
+  void count_wait(std::int64_t since_us);
+  void count_interruption(Place place);
   std::uint64_t broken_off(std::uint64_t noticed_us) const;
   Place place_of(std::uint64_t tick) const;
   void note_interruption(std::uint64_t from_robot_us, Abort cause) const;
@@ -211,6 +214,7 @@ class RunDriver {
   std::uint64_t paused_robot_us_ = 0;         // where the line was broken off; 0: it goes on
   std::optional<std::uint64_t> broken_off_;   // tick, once the robot has gone back meanwhile
   bool makes_room_ = false;                   // before it goes on the robot goes back to 0
+  std::optional<Abort> no_room_;              // it cannot go on, as far as is known
   int ways_back_ = 0;                         // so far
   int told_to_rest_ = 0;                      // how often a pause or an interruption was asked for
   std::uint64_t seen_robot_us_ = 0;           // latest sample of this boot

@@ -39,7 +39,8 @@ void RunDriver::interrupt(Abort why) {
 
 void RunDriver::pause_for(Pause pause) {
   ++told_to_rest_;
-  if (pause_ && !way_feed_ && (!pause_->ends_by_itself || pause.ends_by_itself)) return;
+  // SAFETY: what is late on the way back takes no person's pause away.
+  if (pause_ && !pause_->goes_back && (!pause_->ends_by_itself || pause.ends_by_itself)) return;
   pause_ = std::move(pause);
   changed_.notify();
 }
@@ -61,32 +62,39 @@ asio::awaitable<void> RunDriver::stay_paused() {
   for (bool is_over = false; !is_over && !abort_;) {  // SAFETY: a pause that comes while the way is computed holds it
     co_await until_over_pause(noticed_us);
     const int losses = link_losses_;
+    const bool was_to_make_room = makes_room_;
     tick = broken_off(noticed_us);  // samples of then may have come since
     paused_robot_us_ = feed_.robot_time_us(tick);
     if (!abort_) co_await check_travel(place_of(tick));
-    const station::RobotState& now = *parts_.station.find(request_.robot_id);
-    bool is_away = losses != link_losses_ || now.link != station::LinkState::connected;
-    is_over = !abort_ && !is_away && is_over_pause(now, true);
+    const auto is_away = [&] {
+      return losses != link_losses_ || parts_.station.find(request_.robot_id)->link != station::LinkState::connected;
+    };
+    // SAFETY: whoever stands there was told the other direction.
+    if (was_to_make_room != makes_room_) pause_->goes_on_at_us = 0;
+    is_over = !abort_ && !is_away() && is_over_pause(*parts_.station.find(request_.robot_id), true);
+    if (is_over && no_room_) abort(*no_room_);
     if (is_over && makes_room_ && !abort_) {
       is_over = false;
       broken_off_ = tick;
-      const std::int64_t begun_us = parts_.clock.steady_us();
-      is_away = !co_await go_back();
-      since_us += parts_.clock.steady_us() - begun_us;
+      count_wait(since_us);
+      co_await go_back();
+      since_us = pause_->since_us;
       pause_->goes_on_at_us = 0;
     }
     // SAFETY: who asked before the link was back, or the count-down of then, says nothing of now.
-    if (is_away) pause_->is_resumed = false, pause_->goes_on_at_us = 0;
+    if (is_away()) pause_->is_resumed = false, pause_->goes_on_at_us = 0;
   }
-  if (!abort_ && pause_->ends_by_itself) count_interruption(place_of(tick), since_us);
+  if (!abort_) count_wait(since_us);
+  if (!abort_ && pause_->ends_by_itself) count_interruption(place_of(tick));
   if (!abort_) go_on_from(place_of(tick));
 }
 
-// In closed loop, by the same rules as a step of the line; what is late or speaks against it brings the robot to rest.
-// False: it was broken off.
-asio::awaitable<bool> RunDriver::go_back() {
+// In closed loop, by the same rules as a step of the line, until the robot is at rest; what is late or speaks against
+// it breaks it off.
+asio::awaitable<void> RunDriver::go_back() {
   const int told = told_to_rest_;
   ++ways_back_;
+  pause_->goes_back = true;
   pause_->goes_on_at_us = 0;
   pause_->shown.detail = fmt::format("{}; it goes back to 0, to make room for what is left", pause_->why.detail);
   begin_generation();
@@ -96,19 +104,22 @@ asio::awaitable<bool> RunDriver::go_back() {
   way_feed_.emplace(*request_.way_back, 0, begins_us);
   for (;;) {
     const station::RobotState& robot = *parts_.station.find(request_.robot_id);
-    if (const auto& found = watch_.fault()) abort(*found);
-    if (!abort_) watch_samples();
-    if (!abort_) watch(robot);
+    if (told == told_to_rest_) {
+      if (const auto& found = watch_.fault()) abort(*found);
+      if (!abort_) watch_samples();
+      if (!abort_) watch(robot);
+    }
     const bool is_over = way_feed_->is_over(robot.latest_robot_time_us) && on_their_way_ == 0;
     if (abort_ || told != told_to_rest_ || is_over) break;
     feed(robot);
     co_await changed_.wait_until(parts_.clock, parts_.clock.steady_us() + kTurn.count());
   }
-  way_feed_.reset();
   begin_generation();
-  const Rest found = co_await rest(true);
+  co_await rest(true);
+  way_feed_.reset();
+  if (!pause_->goes_back) co_return;  // another pause
+  pause_->goes_back = false;
   pause_->since_us = parts_.clock.steady_us();  // by now its client may be away for a while again
-  co_return !abort_ && told == told_to_rest_ && found == Rest::at_rest;
 }
 
 RunDriver::InterruptionNote::~InterruptionNote() {
@@ -200,9 +211,15 @@ asio::awaitable<void> RunDriver::check_travel(Place place) {
   const TimeLine rest = rest_of(line_, place.step, place.tick);
   const Result<void> allowed = co_await travel_check_(rest, position_m);
   makes_room_ = !allowed && co_await has_room_from_0(rest, position_m);
-  if (!allowed && !makes_room_)
-    abort({"no_room", fmt::format("{}; going on from {:.3f} m, {}", pause_ ? pause_->why.detail : "", position_m,
-                                  allowed.error().detail)});
+  no_room_.reset();
+  if (!allowed && !makes_room_) {
+    no_room_ = Abort{"no_room", fmt::format("{}; going on from {:.3f} m, {}", pause_ ? pause_->why.detail : "",
+                                            position_m, allowed.error().detail)};
+  }
+  if (pause_ && !pause_->ends_by_itself) {
+    pause_->shown.detail =
+        fmt::format("{}{}", pause_->why.detail, makes_room_ ? "; resumed, it goes back to 0 first" : "");
+  }
 }
 
 asio::awaitable<bool> RunDriver::has_room_from_0(const TimeLine& rest, double position_m) {
@@ -213,8 +230,12 @@ asio::awaitable<bool> RunDriver::has_room_from_0(const TimeLine& rest, double po
   co_return allowed.has_value();
 }
 
-void RunDriver::count_interruption(Place place, std::int64_t since_us) {
-  interrupted_us_ += pause_->goes_on_at_us - kCountDown.count() - since_us;
+// A person's pause is no interruption.
+void RunDriver::count_wait(std::int64_t since_us) {
+  if (pause_->ends_by_itself) interrupted_us_ += pause_->goes_on_at_us - kCountDown.count() - since_us;
+}
+
+void RunDriver::count_interruption(Place place) {
   const std::uint64_t ends =
       place.step + 1 < line_.step_begins.size() ? line_.step_begins[place.step + 1] : line_.ticks;
   const double length_s = static_cast<double>(ends - line_.step_begins[place.step]) * kTick_s;
@@ -288,7 +309,9 @@ bool RunDriver::counts_down() {
   if (pause_->goes_on_at_us == 0) pause_->goes_on_at_us = now_us + kCountDown.count();
   const std::int64_t left_us = pause_->goes_on_at_us - now_us;
   pause_->shown.detail = fmt::format("{}; it {} in {} s unless it is paused", pause_->why.detail,
-                                     makes_room_ ? "goes back to 0, to make room for what is left," : "goes on",
+                                     no_room_      ? "ends, since what is left has no room,"
+                                     : makes_room_ ? "goes back to 0, to make room for what is left,"
+                                                   : "goes on",
                                      std::max<std::int64_t>(0, (left_us + 999'999) / 1'000'000));
   return left_us <= 0;
 }
