@@ -28,11 +28,16 @@ void Accounts::end_expired() {
   for (Token& token : tokens_) {
     const bool has_ended = token.revoked_at_us != 0 || token.standing->ended();
     if (has_ended || !is_past(token)) continue;
-    if (token.expired_at_us == 0) token.expired_at_us = clock_.utc_us();
+    note_expiry(token);
     token.standing->end();
     end_right_of("token:" + token.name, fmt::format("token '{}' has expired", token.name));
-    changed_.notify();
   }
+}
+
+void Accounts::note_expiry(Token& token) {
+  if (token.expired_at_us != 0) return;
+  token.expired_at_us = clock_.utc_us();
+  changed_.notify();
 }
 
 // SAFETY: what was seen to have expired does not hold again because the clock is set back.

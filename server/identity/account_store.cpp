@@ -80,6 +80,10 @@ std::unexpected<Error> unknown(const char* what, const std::string& name) {
 
 }  // namespace
 
+Error has_ended_for_good(const std::string& token) {
+  return {ErrorCode::conflict, fmt::format("token '{}' has ended for good; make a new one", token), "token_has_ended"};
+}
+
 StoredAccounts AccountStore::load() {
   StoredAccounts stored;
   stored.users = read_all(database_, fmt::format("SELECT {} FROM user ORDER BY name", kUserColumns), read_user);
@@ -234,8 +238,7 @@ Result<ApiToken> AccountStore::revive_token(const std::string& name, const stati
   std::optional<ApiToken> token = find_token(name);
   if (!token) return unknown("token", name);
   if (token->revoked_at_us != 0) {
-    return fail(ErrorCode::conflict, fmt::format("token '{}' has ended for good; make a new one", name),
-                "token_has_ended");
+    return std::unexpected{has_ended_for_good(name)};
   }
   if (token->expires_at_us != 0 && token->expires_at_us <= by.at_us) {
     return fail(
@@ -244,8 +247,8 @@ Result<ApiToken> AccountStore::revive_token(const std::string& name, const stati
         "token_has_ended");
   }
   SQLite::Statement revive{database_, "UPDATE api_token SET expired_at_us = 0 WHERE name = ? AND expired_at_us <> 0"};
-  const bool was_refused = storage::execute(revive, name) > 0;
-  if (was_refused) note(by, "account.token_revived", name, nlohmann::json::object());
+  storage::execute(revive, name);
+  note(by, "account.token_revived", name, nlohmann::json::object());
   transaction.commit();
   token->expired_at_us = 0;
   return *token;

@@ -36,6 +36,8 @@ struct UserChange {
   std::optional<bool> disabled;
 };
 
+Error has_ended_for_good(const std::string& token);
+
 class AccountStore {
  public:
   explicit AccountStore(SQLite::Database& database) : database_{database} {}

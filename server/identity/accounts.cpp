@@ -119,8 +119,10 @@ asio::awaitable<bool> Accounts::store_expired() {
     const bool is_for_good = token.expired_at_us != 0 &&
                              removal_clock_.utc_us() - token.expires_at_us >= storage::RemovalClock::kStandsBy.count();
     if (!is_for_good) continue;
-    const auto revoked = co_await revoke_token(token.name, by);
+    auto job = [name = token.name, by](AccountStore& store) { return store.revoke_token(name, by); };
+    const auto revoked = co_await on_store(std::move(job));
     if (!revoked) co_return false;
+    end_token(token, by.at_us);
   }
   co_return true;
 }
@@ -138,7 +140,11 @@ Caller Accounts::caller(std::string actor, const std::string& user, Scopes scope
 std::optional<Caller> Accounts::caller_of_token(const std::string& secret) {
   Token* token = runtime::find_secret(tokens_, runtime::hash_of(secret));
   const std::int64_t now_us = clock_.utc_us();
-  if (token == nullptr || token->revoked_at_us != 0 || is_past(*token)) return std::nullopt;
+  if (token == nullptr || token->revoked_at_us != 0) return std::nullopt;
+  if (is_past(*token)) {
+    note_expiry(*token);
+    return std::nullopt;
+  }
   Caller found = caller("token:" + token->name, token->owner, token->scopes, token->standing);
   if (found.scopes.empty()) return std::nullopt;
   if (now_us - token->last_used_at_us >= kUseSaveInterval) {
@@ -337,10 +343,16 @@ asio::awaitable<Result<ApiToken>> Accounts::revoke_token(std::string name, stati
 }
 
 asio::awaitable<Result<ApiToken>> Accounts::revive_token(std::string name, station::Author by) {
-  auto job = [name, by](AccountStore& store) { return store.revive_token(name, by); };
-  const auto revived = co_await on_store(std::move(job));
   const auto found = std::ranges::find(tokens_, name, &Token::name);
-  if (!revived || found == tokens_.end() || found->revoked_at_us != 0) co_return revived;  // revoked meanwhile
+  if (found == tokens_.end())
+    co_return fail(ErrorCode::not_found, fmt::format("there is no token '{}'", name), "unknown_name");
+  const bool was_stored = std::exchange(found->is_expiry_stored, true);  // nothing comes to the disk behind this
+  auto job = [name, by](AccountStore& store) { return store.revive_token(name, by); };
+  auto revived = co_await on_store(std::move(job));
+  if (revived && found->revoked_at_us != 0)
+    revived = std::unexpected{has_ended_for_good(name)};  // the disk knows it later
+  if (!revived) found->is_expiry_stored = was_stored;
+  if (!revived) co_return revived;
   found->expired_at_us = 0;
   found->is_expiry_stored = false;
   if (found->standing->ended()) found->standing = std::make_shared<Standing>(loop_);

@@ -106,6 +106,7 @@ class Accounts {
   boost::asio::awaitable<bool> save();
   boost::asio::awaitable<bool> store_expired();
   bool is_past(const ApiToken& token) const;
+  void note_expiry(Token& token);
   void end_token(Token& token, std::int64_t utc_us);
   void end_expired();
   void end_what_has_no_right() const;

@@ -4,6 +4,7 @@
 #include <sodium.h>
 
 #include <algorithm>
+#include <cstdlib>
 #include <sstream>
 
 #include "server/runtime/private_file.hpp"
@@ -89,8 +90,8 @@ bool Sessions::is_open(const Open& session) { return session.standing.use_count(
 
 void Sessions::renew(Open& session) {
   session.last_used_at_us = clock_.utc_us();
-  session.ends_at_us = std::max(session.ends_at_us, session.last_used_at_us + kSessionValidity.count());
-  if (session.ends_at_us - session.saved_end_us < kSessionSaveInterval.count()) return;
+  session.ends_at_us = session.last_used_at_us + kSessionValidity.count();
+  if (std::abs(session.ends_at_us - session.saved_end_us) < kSessionSaveInterval.count()) return;
   session.saved_end_us = session.ends_at_us;  // if it cannot be saved, the next hour tries again
   ++revision_;
 }
@@ -127,6 +128,7 @@ void Sessions::sweep() {
   const std::int64_t now_us = clock_.utc_us();
   for (auto session = sessions_.begin(); session != sessions_.end();) {
     const auto each = session++;
+    each->ends_at_us = std::min(each->ends_at_us, now_us + kSessionValidity.count());  // the clock was ahead
     if (is_open(*each)) renew(*each);
     if (each->ends_at_us <= now_us) remove(each);
   }

@@ -137,6 +137,37 @@ TEST_F(ExpiredTokenTest, EndsForGoodWhenTheClockHasStoodByItForADay) {
   EXPECT_FALSE(stored().caller_of_token(secret));
 }
 
+TEST_F(ExpiredTokenTest, IsRefusedForeverByWhoWasRefusedOnce) {
+  clock.step_utc(192h);
+  EXPECT_FALSE(holds());
+  clock.step_utc(-192h);  // before anybody else has looked
+  EXPECT_FALSE(holds());
+}
+
+TEST_F(ExpiredTokenTest, IsNotRevivedThatTheDiskCouldNotEnd) {
+  let_expire(192h);
+  recording.removal_clock.accept();
+  {
+    const SQLite::Database lock = lock_disk();
+    clock.run_for(2min);
+    EXPECT_EQ(listed()["revoked_at_us"], nullptr) << "the disk fails";
+  }
+  clock.run_for(2min);
+  EXPECT_NE(listed()["revoked_at_us"], nullptr);
+  EXPECT_FALSE(stored().caller_of_token(secret));
+  clock.step_utc(-192h);
+  EXPECT_EQ(revive().status, 409);
+}
+
+TEST_F(ExpiredTokenTest, ThatWasRevokedOnlyInMemoryIsNotRevived) {
+  {
+    const SQLite::Database lock = lock_disk();
+    EXPECT_EQ(ask("POST", "/api/v1/tokens/logger/revoke").status, 503);
+  }
+  EXPECT_EQ(revive().status, 409);
+  EXPECT_FALSE(holds());
+}
+
 TEST_F(ExpiredTokenTest, IsKeptAsSuchByADiskThatFailedAWhile) {
   {
     const SQLite::Database lock = lock_disk();

@@ -115,7 +115,9 @@ function TokenTable({ tokens, context, is_off, on_revoke, on_revive }: TableProp
                 <span class="caution">has run out</span>
               ) : token.expired_at_us !== null ? (
                 <>
-                  <span class="caution">refused: it had run out by a clock that was ahead</span>{' '}
+                  <span class="caution">
+                    refused: at <When at_us={token.expired_at_us} is_utc={is_utc} /> the clock was past its end
+                  </span>{' '}
                   <button
                     type="button"
                     id={`station-revive-${token.name}`}
