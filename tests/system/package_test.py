@@ -72,6 +72,15 @@ class PackageTest(unittest.TestCase):
         again = packed(VERSION, self.folder / "again")
         self.assertEqual(self.package.read_bytes(), again.read_bytes())
 
+    def test_1b_its_programs_are_hardened(self):
+        if "CMAKE_BUILD_TYPE:STRING=Release" not in (BUILD / "CMakeCache.txt").read_text():
+            self.skipTest("only the release preset is hardened")
+        for name in ("rheonaut", "rheonaut-export", "rheonaut-sim"):
+            read = ["readelf", "--wide", "--dynamic", "--program-headers", "--dyn-syms", BUILD / "bin" / name]
+            found = subprocess.run(read, check=True, capture_output=True, text=True).stdout
+            for sign in (r"FLAGS_1.*\bNOW\b.*\bPIE\b", "GNU_RELRO", r"GNU_STACK.*\bRW ", "__stack_chk_fail", "_chk@"):
+                self.assertRegex(found, sign, f"{name}: {sign}")
+
     def test_2_apt_installs_it_on_a_bare_system(self):
         begun = time.monotonic()
         self.tree.run("apt-get", "install", "-y", "-qq", "--no-install-recommends", f"/root/{self.older.name}")
