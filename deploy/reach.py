@@ -192,8 +192,8 @@ def reached(root, changed):
 
 
 def is_part(path, test, script):
-    """Whether the file is the script, or the test of it."""
-    return path.split(".")[0] == script or path.rpartition("/")[2] in (test + ".py", script.rpartition("/")[2] + "_test.py")
+    """Whether the file is the script, its tables, or the test of it."""
+    return path.split(".")[0] in (script, script + "_tables") or path.rpartition("/")[2] in (test + ".py", script.rpartition("/")[2] + "_test.py")
 
 
 def is_named(tree, path):

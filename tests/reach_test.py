@@ -116,6 +116,7 @@ class ReachTest(unittest.TestCase):
     def test_a_script_of_the_project_reaches_the_test_of_it(self):
         self.expect("tests/check_docs.py", {"test docs_test"})
         self.expect("tests/check_docs_test.py", {"test docs_test"})
+        self.expect("tests/check_docs_tables.py", {"test docs_test"})
         self.expect("deploy/tidy", {"test tidy_test"})
         self.expect("tests/tidy_test.py", {"test tidy_test"})
 
