@@ -7,10 +7,7 @@
 #include <toml++/toml.h>
 #include <algorithm>
 #include <array>
-#include <cerrno>
 #include <cstdlib>
-#include <fstream>
-#include <iterator>
 #include <map>
 #include <set>
 #include <utility>
@@ -19,6 +16,7 @@
 #include "base/invalid_argument.hpp"
 #include "base/toml_text.hpp"
 #include "base/toml_value.hpp"
+#include "base/whole_file.hpp"
 #include "server/config/endpoint.hpp"
 #include "server/runtime/private_file.hpp"
 
@@ -320,17 +318,18 @@ Config parse_config(const std::string& text, const std::string& name) {
 }
 
 Config load_config(const ConfigFlags& flags) {
+  constexpr std::size_t kMaxConfigBytes = 1 << 20;
   Config config;
   if (flags.file) {
     std::error_code error;
     if (!std::filesystem::is_regular_file(*flags.file, error) && error != std::errc::permission_denied) {
       base::throw_invalid("config file '", flags.file->string(), "' does not exist");
     }
-    std::ifstream in{*flags.file, std::ios::binary};
-    if (!in) base::throw_invalid("cannot read the config file: ", runtime::denial(*flags.file, errno));
-    const std::string text{std::istreambuf_iterator<char>{in}, {}};
-    if (!in) base::throw_invalid("config file '", flags.file->string(), "' cannot be read");
-    ConfigFile file{text, flags.file->string()};
+    const base::WholeFile whole = base::read_whole(*flags.file, kMaxConfigBytes);
+    if (whole.error != 0)
+      base::throw_invalid("cannot read the config file: ", runtime::denial(*flags.file, whole.error));
+    if (!whole.problem.empty()) base::throw_invalid("config file '", flags.file->string(), "' ", whole.problem);
+    ConfigFile file{whole.text, flags.file->string()};
     read(file, config);
   }
   if (flags.data_dir) config.data_dir = *flags.data_dir;

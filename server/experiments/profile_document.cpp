@@ -5,9 +5,7 @@
 #include <array>
 #include <cmath>
 #include <filesystem>
-#include <fstream>
 #include <numbers>
-#include <sstream>
 #include <utility>
 
 #include "base/field_list.hpp"
@@ -15,10 +13,12 @@
 #include "base/invalid_argument.hpp"
 #include "base/json_table.hpp"
 #include "base/toml_text.hpp"
+#include "base/whole_file.hpp"
 #include "control/identification/three_tones.hpp"
 #include "server/experiments/duty_signals.hpp"
 #include "server/experiments/time_line.hpp"
 #include "server/experiments/until_rules.hpp"
+#include "server/runtime/private_file.hpp"
 
 namespace server::experiments {
 namespace {
@@ -332,14 +332,17 @@ Profile find_profile(const std::string& name_or_file) {
     if (shipped.name == name_or_file) return parse_profile(shipped.content, std::string(shipped.name) + ".toml");
     names.emplace_back(shipped.name);
   }
-  if (!std::filesystem::is_regular_file(name_or_file)) {
+  std::error_code hidden;  // in a folder of another user, which the reader names
+  if (!std::filesystem::is_regular_file(name_or_file, hidden) && hidden != std::errc::permission_denied) {
     base::throw_invalid("there is no profile '", name_or_file, "', neither a file nor one of ", base::list_of(names),
                         base::did_you_mean(name_or_file, names));
   }
-  std::ifstream stream{name_or_file, std::ios::binary};
-  std::ostringstream text;
-  if (!(stream && text << stream.rdbuf())) base::throw_invalid("profile '", name_or_file, "' cannot be read");
-  return parse_profile(text.str(), name_or_file);
+  const base::WholeFile whole = base::read_whole(std::filesystem::path{name_or_file}, kMaxProfileFileBytes);
+  if (whole.error != 0) {
+    base::throw_invalid("profile '", name_or_file, "' cannot be read: ", runtime::denial(name_or_file, whole.error));
+  }
+  if (!whole.problem.empty()) base::throw_invalid("profile '", name_or_file, "' ", whole.problem);
+  return parse_profile(whole.text, name_or_file);
 }
 
 }  // namespace server::experiments

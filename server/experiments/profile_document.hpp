@@ -4,6 +4,7 @@
 // `name: key: what is wrong`), with the value and what is allowed. A profile that was read is within its own limits.
 #pragma once
 
+#include <cstddef>
 #include <span>
 #include <string>
 #include <string_view>
@@ -21,6 +22,8 @@ std::string profile_tables();
 
 // JSON begins with {, as no TOML does. `name` stands for the text in errors.
 Profile parse_profile(std::string_view text, const std::string& name);
+
+inline constexpr std::size_t kMaxProfileFileBytes = 1 << 20;
 
 // A file, or one of shipped_profiles() by its name.
 Profile find_profile(const std::string& name_or_file);

@@ -5,11 +5,11 @@
 #include <fmt/format.h>
 #include <openssl/pem.h>
 
-#include <cerrno>
 #include <ctime>
 #include <stdexcept>
 
 #include "base/tls/public_key.hpp"
+#include "base/whole_file.hpp"
 #include "server/runtime/private_file.hpp"
 
 namespace server::tls {
@@ -17,12 +17,19 @@ namespace fs = std::filesystem;
 
 namespace {
 
+// A copy of the file in memory.
 base::Openssl<BIO> open(const fs::path& file) {
-  errno = 0;
-  base::Openssl<BIO> bio{BIO_new_file(file.c_str(), "r")};
-  if (bio) return bio;
-  const std::string denial = errno == EACCES ? runtime::denial(file, errno) : base::openssl_error("no reason");
-  throw std::runtime_error{fmt::format("cannot read '{}': {}", file.string(), denial)};
+  constexpr std::size_t kMaxBytes = 1 << 20;
+  const base::WholeFile whole = base::read_whole(file, kMaxBytes);
+  if (whole.error != 0) {
+    throw std::runtime_error{fmt::format("cannot read '{}': {}", file.string(), runtime::denial(file, whole.error))};
+  }
+  if (!whole.problem.empty()) throw std::runtime_error{fmt::format("'{}' {}", file.string(), whole.problem)};
+  base::Openssl<BIO> memory{BIO_new(BIO_s_mem())};
+  if (!memory || BIO_write(memory.get(), whole.text.data(), static_cast<int>(whole.text.size())) < 0) {
+    throw std::runtime_error{fmt::format("cannot read '{}': {}", file.string(), base::openssl_error("no reason"))};
+  }
+  return memory;
 }
 
 // A key behind a password would ask for it on the terminal, and the station would wait.

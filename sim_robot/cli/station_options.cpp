@@ -2,23 +2,29 @@
 #include "sim_robot/cli/station_options.hpp"
 
 #include <CLI/CLI.hpp>
-#include <fstream>
+#include <cerrno>
+#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
 #include "base/tls/public_key.hpp"
+#include "base/whole_file.hpp"
 
 namespace sim_robot {
 namespace {
 
 // What the station says of itself while it runs (server/config/data_folder.hpp).
 nlohmann::json announcement_in(const std::string& data_dir) {
-  std::ifstream in{data_dir + "/endpoints.json"};
-  if (!in) {
+  constexpr std::size_t kMaxBytes = 64 * 1024;
+  const base::WholeFile whole = base::read_whole(data_dir + "/endpoints.json", kMaxBytes);
+  if (!whole.problem.empty() && whole.error != ENOENT && whole.error != ENOTDIR) {
+    throw std::runtime_error(data_dir + "/endpoints.json " + whole.problem);
+  }
+  if (!whole.problem.empty()) {
     throw std::runtime_error("no station runs in '" + data_dir +
                              "': there is no endpoints.json; rheonaut serve --data " + data_dir + " starts one");
   }
-  auto content = nlohmann::json::parse(in, nullptr, false);
+  auto content = nlohmann::json::parse(whole.text, nullptr, false);
   if (content.is_object() && content.contains("robots") && content["robots"].is_string()) return content;
   throw std::runtime_error("'" + data_dir + "/endpoints.json' does not say where the station is");
 }
@@ -33,7 +39,10 @@ StationAddress announced(const nlohmann::json& announcement) {
 
 // The station's certificate lies on this machine: its key is the one to trust.
 std::string pin_of_certificate(const std::string& file) {
-  const base::Openssl<BIO> in{BIO_new_file(file.c_str(), "r")};
+  constexpr std::size_t kMaxBytes = 1 << 20;
+  const base::WholeFile whole = base::read_whole(std::filesystem::path{file}, kMaxBytes);
+  if (!whole.problem.empty()) throw std::runtime_error("the station's certificate '" + file + "' " + whole.problem);
+  const base::Openssl<BIO> in{BIO_new_mem_buf(whole.text.data(), static_cast<int>(whole.text.size()))};
   const base::Openssl<X509> certificate{in ? PEM_read_bio_X509(in.get(), nullptr, nullptr, nullptr) : nullptr};
   const EVP_PKEY* key = certificate ? X509_get0_pubkey(certificate.get()) : nullptr;
   if (key == nullptr) throw std::runtime_error("the station's certificate '" + file + "' cannot be read");

@@ -4,11 +4,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <fstream>
-#include <iterator>
 #include <map>
 
 #include "base/invalid_argument.hpp"
+#include "base/whole_file.hpp"
 #include "sim_robot/lab/station_peer.hpp"
 
 namespace sim_robot {
@@ -154,10 +153,10 @@ std::size_t Recording::write(std::uint64_t number, const Head& head, std::uint8_
 }
 
 Recording load_recording(const std::filesystem::path& path) {
-  std::ifstream file{path, std::ios::binary};
-  if (!file) base::throw_invalid("recording: cannot open ", path.string());
-  const std::vector<char> bytes{std::istreambuf_iterator<char>(file), {}};
-  return Recording{{reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size()}};
+  constexpr std::size_t kMaxBytes = 1 << 30;  // a day of one robot, or more
+  const base::WholeFile whole = base::read_whole(path, kMaxBytes);
+  if (!whole.problem.empty()) base::throw_invalid("recording: ", path.string(), " ", whole.problem);
+  return Recording{{reinterpret_cast<const std::uint8_t*>(whole.text.data()), whole.text.size()}};
 }
 
 Recording make_recording(double seconds, std::uint32_t samples_per_frame, std::uint64_t seed) {

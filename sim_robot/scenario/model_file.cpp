@@ -3,12 +3,11 @@
 
 #include <algorithm>
 #include <array>
-#include <fstream>
 #include <nlohmann/json.hpp>
-#include <sstream>
 #include <string_view>
 
 #include "base/invalid_argument.hpp"
+#include "base/whole_file.hpp"
 
 namespace sim_robot {
 namespace {
@@ -70,11 +69,11 @@ PlantParameters parse_model(const std::string& json) {
 }
 
 PlantParameters load_model(const std::string& path) {
-  std::ifstream file{path, std::ios::binary};
-  std::ostringstream text;
-  if (!(file && text << file.rdbuf())) base::throw_invalid(path, ": cannot be read");
+  constexpr std::size_t kMaxBytes = 1 << 20;
+  const base::WholeFile whole = base::read_whole(std::filesystem::path{path}, kMaxBytes);
+  if (!whole.problem.empty()) base::throw_invalid(path, ": ", whole.problem);
   try {
-    return parse_model(text.str());
+    return parse_model(whole.text);
   } catch (const std::invalid_argument& error) {
     base::throw_invalid(path, ": ", error.what());
   }

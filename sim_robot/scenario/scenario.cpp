@@ -1,12 +1,12 @@
 // Reads a scenario from TOML.
 #include "sim_robot/scenario/scenario.hpp"
 
-#include <fstream>
-#include <sstream>
+#include <cstddef>
 
 #include "base/field_reader.hpp"
 #include "base/invalid_argument.hpp"
 #include "base/toml_text.hpp"
+#include "base/whole_file.hpp"
 
 namespace sim_robot {
 Scenario parse_scenario(std::string_view text, const std::string& name) {
@@ -20,12 +20,11 @@ Scenario parse_scenario(std::string_view text, const std::string& name) {
 }
 
 Scenario load_scenario(const std::filesystem::path& file) {
-  std::ifstream stream{file, std::ios::binary};
-  std::ostringstream text;
-  if (!std::filesystem::is_regular_file(file) || !(stream && text << stream.rdbuf())) {
-    base::throw_invalid("scenario '", file.string(), "' cannot be read");
-  }
-  return parse_scenario(text.str(), file.string());
+  constexpr std::size_t kMaxBytes = 1 << 20;
+  if (!std::filesystem::is_regular_file(file)) base::throw_invalid("scenario '", file.string(), "' cannot be read");
+  const base::WholeFile whole = base::read_whole(file, kMaxBytes);
+  if (!whole.problem.empty()) base::throw_invalid("scenario '", file.string(), "' ", whole.problem);
+  return parse_scenario(whole.text, file.string());
 }
 
 Scenario find_scenario(const std::string& name_or_file) {

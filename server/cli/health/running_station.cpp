@@ -7,9 +7,9 @@
 
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/tcp.hpp>
-#include <fstream>
 
 #include "base/version.hpp"
+#include "base/whole_file.hpp"
 #include "server/cli/accounts/station_client.hpp"
 #include "server/cli/health/listening_program.hpp"
 #include "server/cli/terminal/output.hpp"
@@ -50,9 +50,10 @@ bool answers_within_patience(const std::string& address) {
 }
 
 void read_announcement(const std::filesystem::path& file, RunningStation& running) {
-  std::ifstream in{file};
-  running.has_announcement = in.good();
-  const auto content = nlohmann::json::parse(in, nullptr, false);
+  constexpr std::size_t kMaxBytes = 64 * 1024;
+  const base::WholeFile whole = base::read_whole(file, kMaxBytes);
+  running.has_announcement = whole.problem.empty();
+  const auto content = nlohmann::json::parse(whole.text, nullptr, false);
   if (!content.is_object()) return;
   running.http = content.value("http", "");
   running.robots = content.value("robots", "");

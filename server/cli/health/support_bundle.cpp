@@ -19,6 +19,7 @@
 #include <sstream>
 
 #include "base/version.hpp"
+#include "base/whole_file.hpp"
 #include "server/analysis/capsule/archive_writer.hpp"
 #include "server/cli/accounts/station_client.hpp"
 #include "server/cli/health/doctor.hpp"
@@ -36,7 +37,7 @@ using nlohmann::ordered_json;
 
 namespace {
 
-constexpr std::size_t kMostLogLines = 5000;
+constexpr std::size_t kMostLogLines = 5000, kMostLogBytes = 8 << 20;
 constexpr std::int64_t kMicrosecondsADay = 86'400'000'000;
 constexpr const char* kJournal = "journalctl -u rheonaut -n 5000 --no-pager -o short-iso-precise 2>/dev/null";
 constexpr const char* kAbout =
@@ -212,10 +213,14 @@ std::string events_of_last_day(SQLite::Database& database, const Redaction& reda
 std::string log_lines(const SupportBundle& options) {
   std::string text;
   if (options.log) {
-    std::ifstream in{*options.log};
+    std::error_code unknown;
+    const std::uintmax_t bytes = fs::file_size(*options.log, unknown);  // of a regular file alone
+    std::ifstream in{unknown ? fs::path{} : *options.log, std::ios::binary};
     if (!in) return fmt::format("{} cannot be read\n", options.log->string());
+    if (bytes > kMostLogBytes) in.seekg(static_cast<std::streamoff>(bytes - kMostLogBytes));
+    std::istringstream newest{base::read_whole(in, 2 * kMostLogBytes).text};  // it may grow meanwhile
     std::deque<std::string> last;
-    for (std::string line; std::getline(in, line);) {
+    for (std::string line; std::getline(newest, line);) {
       last.push_back(std::move(line));
       if (last.size() > kMostLogLines) last.pop_front();
     }

@@ -1,18 +1,16 @@
-// Block by block, so that no more is read than is allowed.
+// By base::read_whole; a file of another user is refused with its owner.
 #include "server/cli/terminal/input.hpp"
 
 #include <fmt/format.h>
 
-#include <array>
-#include <cerrno>
-#include <cstring>
-#include <filesystem>
-#include <fstream>
 #include <iostream>
 #include <stdexcept>
+#include <utility>
 
 #include "base/json_text.hpp"
 #include "base/nesting.hpp"
+#include "base/whole_file.hpp"
+#include "server/runtime/private_file.hpp"
 
 namespace server::cli {
 namespace {
@@ -26,18 +24,10 @@ constexpr std::size_t kMaxJsonBytes = 1 << 20;
 }  // namespace
 
 std::string read_text(const std::string& file, std::size_t max_bytes) {
-  if (std::filesystem::is_directory(file)) refuse(file, "is a folder; give a file");
-  std::ifstream from_file;
-  if (file != "-") from_file.open(file, std::ios::binary);
-  std::istream& stream = file == "-" ? std::cin : from_file;
-  if (!stream) refuse(file, fmt::format("cannot be read: {}", std::strerror(errno)));
-  std::string text;
-  for (std::array<char, 65536> block{}; stream.read(block.data(), block.size()) || stream.gcount() > 0;) {
-    text.append(block.data(), static_cast<std::size_t>(stream.gcount()));
-    if (text.size() > max_bytes) refuse(file, fmt::format("has more than {} bytes", max_bytes));
-  }
-  if (stream.bad()) refuse(file, fmt::format("cannot be read: {}", std::strerror(errno)));
-  return text;
+  base::WholeFile whole = file == "-" ? base::read_whole(std::cin, max_bytes) : base::read_whole(file, max_bytes);
+  if (whole.error != 0) refuse(file, "cannot be read: " + runtime::denial(file, whole.error));
+  if (!whole.problem.empty()) refuse(file, whole.problem);
+  return std::move(whole.text);
 }
 
 nlohmann::json read_json(const std::string& file) {

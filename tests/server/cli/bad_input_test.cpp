@@ -1,6 +1,7 @@
 // What the tools say to files and flags that they cannot use: one sentence with the place, the value and what is
 // allowed.
 #include <gmock/gmock.h>
+#include <sys/stat.h>
 
 #include "tests/server/cli/tool_test.hpp"
 
@@ -53,6 +54,25 @@ TEST_F(BadInput, FilesForAStationAreOfBoundedDepthAndSize) {
   for (const char* command : {"job begin", "fluid model newtonian", "design save --kind model --name x"}) {
     EXPECT_THAT(complaint(fmt::format("{} @deep.json --data @.", command)), HasSubstr("more than 64 deep"));
     EXPECT_THAT(complaint(fmt::format("{} /dev/zero --data @.", command)), HasSubstr("has more than 1048576 bytes"));
+  }
+}
+
+TEST_F(BadInput, AFileOfAnySizeIsBounded) {
+  save("large", "name = \"x\"\n");
+  std::filesystem::resize_file(folder_ / "large", std::uintmax_t{1} << 30);  // sparse
+  EXPECT_THAT(complaint("profile @large"), HasSubstr("has more than 1048576 bytes"));
+  EXPECT_THAT(complaint("check-config --config @large"), HasSubstr("has more than 1048576 bytes"));
+  EXPECT_THAT(complaint("bode --plant @large"), HasSubstr("has more than 1048576 bytes"));
+  EXPECT_THAT(complaint("identify --csv @large"), HasSubstr("has more than 536870912 bytes"));
+  EXPECT_THAT(complaint("job begin @large --data @."), HasSubstr("has more than 1048576 bytes"));
+}
+
+// A pipe that nobody writes to would be waited for.
+TEST_F(BadInput, AProfileOrConfigurationIsNoPipeAndNoDevice) {
+  ASSERT_EQ(::mkfifo((folder_ / "pipe").c_str(), 0600), 0);
+  for (const char* file : {"@pipe", "/dev/zero"}) {
+    EXPECT_THAT(complaint(std::string{"profile "} + file), HasSubstr("there is no profile"));
+    EXPECT_THAT(complaint(std::string{"check-config --config "} + file), HasSubstr("does not exist"));
   }
 }
 
