@@ -123,6 +123,19 @@ std::string denial(const fs::path& path, int error) {
                      owner, mode, self, owner, give_away);
 }
 
+std::optional<std::string> denied(const fs::path& path, int mode) {
+  if (::eaccess(path.c_str(), mode) == 0 || (errno != EACCES && errno != EPERM)) return std::nullopt;
+  return denial(path, errno);
+}
+
+bool is_there(const fs::path& path) {
+  struct stat status{};
+  if (::stat(path.c_str(), &status) == 0) return true;
+  if (errno == EACCES)
+    throw std::runtime_error{fmt::format("cannot open '{}': {}", path.string(), denial(path, errno))};
+  return false;
+}
+
 void require_own_folder(const fs::path& folder) {
   struct stat status{};
   if (::stat(folder.c_str(), &status) != 0) cannot("look at", folder);

@@ -30,4 +30,12 @@ void require_own_folder(const std::filesystem::path& folder);
 // keeps this program from it, and what to do.
 std::string denial(const std::filesystem::path& path, int error);
 
+// The denial() of a path that this program may not use so: R_OK, W_OK or X_OK of unistd.h, or several. None for a path
+// that it may use so, and for one that is not there.
+std::optional<std::string> denied(const std::filesystem::path& path, int mode);
+
+// Whether the path is there. Throws std::runtime_error with the denial() where a folder on the way keeps this program
+// from looking.
+bool is_there(const std::filesystem::path& path);
+
 }  // namespace server::runtime

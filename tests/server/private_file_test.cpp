@@ -9,6 +9,7 @@
 
 #include "server/config/data_folder.hpp"
 #include "server/runtime/tasks.hpp"
+#include "tests/server/another_user.hpp"
 #include "tests/server/captured_log.hpp"
 #include "tests/server/virtual_clock.hpp"
 
@@ -16,8 +17,6 @@ namespace server {
 namespace {
 
 namespace fs = std::filesystem;
-
-constexpr uid_t kNobody = 65534;
 
 class PrivateFile : public testing::Test {
  protected:

@@ -2,6 +2,7 @@
 #include "server/analysis/capsule/archive_reader.hpp"
 
 #include <fmt/format.h>
+#include <unistd.h>
 #include <unzip.h>
 
 #include <algorithm>
@@ -10,6 +11,7 @@
 #include <stdexcept>
 
 #include "server/analysis/capsule/archive_writer.hpp"
+#include "server/runtime/private_file.hpp"
 
 namespace server::analysis {
 namespace {
@@ -25,6 +27,9 @@ std::unexpected<Error> damaged(const std::string& name) {
 }  // namespace
 
 ArchiveReader::ArchiveReader(std::filesystem::path path) : path_{std::move(path)} {
+  if (const auto denial = runtime::denied(path_, R_OK)) {
+    throw std::runtime_error{fmt::format("cannot read {}: {}", path_.string(), *denial)};
+  }
   if (std::filesystem::is_regular_file(path_)) zip_ = unzOpen64(path_.c_str());  // a fifo would be waited for
   if (zip_ == nullptr) throw std::runtime_error{fmt::format("{} is no zip archive, or damaged", path_.string())};
 }

@@ -11,6 +11,7 @@
 
 #include "server/cli/accounts/author.hpp"
 
+#include "server/runtime/private_file.hpp"
 namespace server::cli {
 namespace fs = std::filesystem;
 using nlohmann::json;
@@ -70,7 +71,7 @@ AccountAccess::AccountAccess(const fs::path& data_dir, Missing missing) {
   const fs::path database = data_dir / "station.sqlite";
   if (missing == Missing::make) {
     config::make_data_folder(data_dir);
-  } else if (!fs::exists(database)) {
+  } else if (!runtime::is_there(database)) {
     throw std::runtime_error{fmt::format("there is no '{}'", database.string())};
   }
   if (auto lock = config::FolderLock::try_take(data_dir)) {

@@ -47,11 +47,11 @@ asio::ip::tcp::endpoint endpoint_of(const nlohmann::json& announcement) {
 }
 
 std::string token_of(const std::filesystem::path& file) {
-  if (!std::filesystem::exists(file.parent_path())) {
+  if (!runtime::is_there(file.parent_path())) {
     throw std::runtime_error{
         fmt::format("there is no folder '{}'; --data names that of a station", file.parent_path().string())};
   }
-  if (!std::filesystem::exists(file)) {
+  if (!runtime::is_there(file)) {
     throw std::runtime_error{
         fmt::format("'{}' is no station's data folder, or its station has never run: there is no rheonaut.token in it",
                     file.parent_path().string())};

@@ -17,6 +17,7 @@
 #include "server/cli/terminal/progress.hpp"
 #include "server/config/data_folder.hpp"
 #include "server/runtime/clock.hpp"
+#include "server/runtime/private_file.hpp"
 #include "server/runtime/tasks.hpp"
 #include "server/storage/database/backup_copy.hpp"
 #include "server/storage/database/finished_file.hpp"
@@ -32,10 +33,14 @@ constexpr int kAccepted = 202;
 
 void check(const Backup& options) {
   const fs::path database = options.data_dir / "station.sqlite";
-  if (!fs::exists(database)) throw std::runtime_error{fmt::format("there is no '{}'", database.string())};
-  if (fs::exists(options.to)) throw std::runtime_error{fmt::format("'{}' is there already", options.to.string())};
+  if (!runtime::is_there(database)) throw std::runtime_error{fmt::format("there is no '{}'", database.string())};
+  if (runtime::is_there(options.to))
+    throw std::runtime_error{fmt::format("'{}' is there already", options.to.string())};
   const fs::path folder = fs::absolute(options.to).parent_path();
   if (!fs::is_directory(folder)) throw std::runtime_error{fmt::format("there is no folder '{}'", folder.string())};
+  if (const auto denial = runtime::denied(folder, W_OK | X_OK)) {
+    throw std::runtime_error{fmt::format("no backup can be written into '{}': {}", folder.string(), *denial)};
+  }
 }
 
 // The record of that name, as the station reports it now.

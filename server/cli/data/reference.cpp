@@ -19,6 +19,7 @@
 #include "server/cli/terminal/options.hpp"
 #include "server/cli/terminal/progress.hpp"
 #include "server/config/data_folder.hpp"
+#include "server/runtime/private_file.hpp"
 #include "server/storage/database/database.hpp"
 #include "server/storage/query/run_reader.hpp"
 
@@ -69,7 +70,8 @@ void add_clock_options(CLI::App& sub, ReferenceCommand& options) {
 }
 
 std::string text_of_file(const std::string& file) {
-  if (!fs::is_regular_file(file)) throw std::runtime_error{fmt::format("cannot read '{}': no file", file)};
+  if (runtime::is_there(file) && !fs::is_regular_file(file))
+    throw std::runtime_error{fmt::format("cannot read '{}': no file", file)};
   return read_text(file, analysis::kMaxReferenceBytes);
 }
 
@@ -263,7 +265,7 @@ void add_options(CLI::App& command, ReferenceCommand& options) {
 
 int run(const ReferenceCommand& options, std::ostream& out) {
   const fs::path database = options.data_dir / "station.sqlite";
-  if (!fs::exists(database)) throw std::runtime_error{fmt::format("there is no '{}'", database.string())};
+  if (!runtime::is_there(database)) throw std::runtime_error{fmt::format("there is no '{}'", database.string())};
   switch (options.act) {
     case Act::import: import_one(options, out); break;
     case Act::show: write(options, read_stored(options, false).reference, out); break;

@@ -175,7 +175,8 @@ void write_table(std::ostream& out, const Profile& profile, const std::vector<Pr
 
 // Throws UsageError with the names where there is no such profile.
 Profile profile_of(const std::string& name_or_file) {
-  const bool is_file = std::filesystem::exists(name_or_file);
+  std::error_code hidden;  // a file that this program may not see is one, too
+  const bool is_file = std::filesystem::exists(name_or_file, hidden) || hidden;
   try {
     return experiments::find_profile(name_or_file);
   } catch (const std::invalid_argument& error) {

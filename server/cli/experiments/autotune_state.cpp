@@ -37,7 +37,7 @@ void refuse_another(const std::filesystem::path& file, const json& held, const j
 }  // namespace
 
 AutotuneState::AutotuneState(std::optional<std::filesystem::path> file, const json& request) : file_{std::move(file)} {
-  if (file_ && std::filesystem::exists(*file_)) {
+  if (file_ && runtime::is_there(*file_)) {
     document_ = read_document(*file_);
     refuse_another(*file_, document_.at("request"), request);
     const json client = document_.value("client", json());

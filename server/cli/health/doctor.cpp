@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 #include <fmt/ostream.h>
+#include <unistd.h>
 
 #include <CLI/CLI.hpp>
 
@@ -15,6 +16,7 @@
 #include "server/cli/terminal/options.hpp"
 #include "server/config/file_system.hpp"
 #include "server/runtime/exceptions.hpp"
+#include "server/runtime/private_file.hpp"
 
 namespace server::cli {
 namespace {
@@ -43,6 +45,11 @@ Findings examine(const config::ConfigFlags& flags) {
   if (!std::filesystem::is_directory(config.data_dir)) {
     findings.problem("data", fmt::format("there is no data folder {}", config.data_dir.string()),
                      "name it with --data, or in the configuration with --config; rheonaut serve makes a new one");
+    judge_clock(clock, findings);
+    return findings;
+  }
+  if (const auto denial = runtime::denied(config.data_dir, R_OK | X_OK)) {
+    findings.problem("data", one_line(*denial), "run rheonaut doctor as that user, or as root");
     judge_clock(clock, findings);
     return findings;
   }

@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <sqlite3.h>
+#include <unistd.h>
 
 #include <boost/asio/io_context.hpp>
 #include <map>
@@ -12,6 +13,7 @@
 #include "server/cli/terminal/output.hpp"
 #include "server/runtime/clock.hpp"
 #include "server/runtime/exceptions.hpp"
+#include "server/runtime/private_file.hpp"
 #include "server/storage/database/file_check.hpp"
 #include "server/storage/database/schema.hpp"
 #include "server/storage/query/run_reader.hpp"
@@ -191,6 +193,10 @@ void judge_robots(std::size_t known, const RunningStation& running, Findings& fi
 }  // namespace
 
 std::int64_t check_database(const fs::path& path, Findings& findings) {
+  if (const auto denial = runtime::denied(path, R_OK)) {
+    findings.problem("database", one_line(*denial), kReadAgain);
+    return 0;
+  }
   if (!fs::exists(path)) {
     findings.note("database", fmt::format("there is no {} yet", path.string()), "rheonaut serve makes it");
     return 0;
@@ -229,7 +235,9 @@ void check_robots(const fs::path& path, const RunningStation& running, std::int6
     check_refusals(database, now_us, of_robots);
     return {};
   };
-  if (fs::exists(path)) static_cast<void>(storage::read_store(path, read));  // check_database has said what is wrong
+  std::error_code hidden;
+  if (fs::exists(path, hidden))
+    static_cast<void>(storage::read_store(path, read));  // check_database has said what is wrong
   findings.append(of_robots);
 }
 

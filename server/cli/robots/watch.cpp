@@ -18,6 +18,7 @@
 #include "server/cli/terminal/keys.hpp"
 #include "server/cli/terminal/options.hpp"
 #include "server/runtime/exceptions.hpp"
+#include "server/runtime/private_file.hpp"
 
 namespace server::cli {
 namespace {
@@ -265,8 +266,7 @@ void add_options(CLI::App& command, WatchCommand& options) {
 }
 
 int run(const WatchCommand& options, std::ostream& out) {
-  if (!std::filesystem::exists(
-          options.data_dir)) {  // a station that is not there yet is waited for; a wrong name is not
+  if (!runtime::is_there(options.data_dir)) {  // a station that is not there yet is waited for; a wrong name is not
     throw std::runtime_error{
         fmt::format("there is no folder '{}'; --data names that of a station", options.data_dir.string())};
   }

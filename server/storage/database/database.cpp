@@ -6,10 +6,12 @@
 #include <spdlog/spdlog.h>
 #include <sqlite3.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include <stdexcept>
 
 #include "server/runtime/exceptions.hpp"
+#include "server/runtime/private_file.hpp"
 #include "server/storage/database/file_check.hpp"
 #include "server/storage/database/migration_copy.hpp"
 #include "server/storage/database/schema.hpp"
@@ -56,6 +58,7 @@ void keep_log(SQLite::Database& database, bool keep) {
 }
 
 SQLite::Database open_checked(const std::filesystem::path& path) {
+  if (const auto denial = runtime::denied(path, R_OK | W_OK)) refuse(path, *denial);
   if (is_symlink(path)) {  // SAFETY: it could lead to a file of somebody else
     throw std::runtime_error{
         fmt::format("'{}' is a link, and the database is not written through one: move the file that it leads to here, "

@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 #include <sqlite3.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <array>
@@ -13,6 +14,7 @@
 #include <string_view>
 
 #include "server/runtime/exceptions.hpp"
+#include "server/runtime/private_file.hpp"
 #include "server/storage/database/schema.hpp"
 
 namespace server::storage {
@@ -135,6 +137,7 @@ std::optional<std::string> file_problem(const fs::path& path) {
   if (size_or_zero(path) == 0) {
     return has_hot_journal(path) ? std::optional{"it is empty, and a journal beside it is not ours"} : std::nullopt;
   }
+  if (auto denial = runtime::denied(path, R_OK)) return denial;
   const Bytes head{path, kHeadBytes};
   if (head.size() == 0) return "it cannot be read";
   // The power may have failed while the first page was moved out of the log: SQLite reads it from there, and

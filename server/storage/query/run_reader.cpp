@@ -3,6 +3,7 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <sqlite3.h>
 #include <sys/file.h>
 #include <unistd.h>
 
@@ -11,6 +12,7 @@
 #include <charconv>
 
 #include "server/runtime/exceptions.hpp"
+#include "server/runtime/private_file.hpp"
 #include "server/storage/database/database.hpp"
 #include "server/storage/database/schema.hpp"
 #include "server/storage/database/statement.hpp"
@@ -118,6 +120,14 @@ bool is_at_rest(const std::filesystem::path& path) {
   return !std::filesystem::exists(path.string() + "-wal") && lock_is_free(path);
 }
 
+// Whose the file is, or its write-ahead log, that this program may not read.
+std::optional<std::string> denied_store(const std::filesystem::path& path) {
+  for (const char* suffix : {"", "-wal", "-shm"}) {
+    if (auto denial = runtime::denied(std::filesystem::path{path}.concat(suffix), R_OK)) return denial;
+  }
+  return std::nullopt;
+}
+
 // As a URI, which alone can say that the file does not change: then SQLite makes no files beside it.
 SQLite::Database open_at_rest(const std::filesystem::path& path) {
   return SQLite::Database{reading_uri(path, true), SQLite::OPEN_READONLY | SQLite::OPEN_URI};
@@ -135,6 +145,9 @@ std::string reading_uri(const std::filesystem::path& path, bool at_rest) {
 }
 
 Result<void> read_store(const std::filesystem::path& path, const ReadStore& read) {
+  if (const auto denial = denied_store(path)) {
+    return fail(ErrorCode::unavailable, fmt::format("cannot read {}: {}", path.string(), *denial));
+  }
   if (!std::filesystem::exists(path)) {
     return fail(ErrorCode::not_found, fmt::format("there is no {}; --data names the station's folder", path.string()));
   }
@@ -150,7 +163,12 @@ Result<void> read_store(const std::filesystem::path& path, const ReadStore& read
     }
     return checked(open_for_reading(path), false);  // also when a station has begun meanwhile
   } catch (const SQLite::Exception& error) {
-    return fail(ErrorCode::unavailable, fmt::format("cannot read {}: {}", path.string(), runtime::text_of(error)));
+    // A database that was left with its log is read by a file beside it.
+    const auto denial = error.getErrorCode() == SQLITE_CANTOPEN
+                            ? runtime::denied(std::filesystem::absolute(path).parent_path(), W_OK | X_OK)
+                            : std::nullopt;
+    return fail(ErrorCode::unavailable,
+                fmt::format("cannot read {}: {}", path.string(), denial.value_or(runtime::text_of(error))));
   }
 }
 

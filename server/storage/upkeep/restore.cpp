@@ -3,11 +3,13 @@
 
 #include <fmt/format.h>
 #include <sodium.h>
+#include <unistd.h>
 
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
 #include "server/runtime/exceptions.hpp"
+#include "server/runtime/private_file.hpp"
 #include "server/storage/audit/audit_chain.hpp"
 #include "server/storage/database/backup_copy.hpp"
 #include "server/storage/database/database.hpp"
@@ -29,6 +31,7 @@ namespace {
 }
 
 void check(const fs::path& from, const fs::path& to) {
+  if (const auto denial = runtime::denied(from, R_OK)) refuse(from, *denial);
   if (!fs::is_regular_file(from)) refuse(from, "there is no such file");
   for (const char* suffix : {"", "-wal", "-journal"}) {
     const fs::path existing = fs::path{to}.concat(suffix);

@@ -8,6 +8,7 @@
 #include <fstream>
 
 #include "server/storage/database/file_check.hpp"
+#include "tests/server/another_user.hpp"
 #include "tests/server/recording/recording_test.hpp"
 #include "tests/server/recording/stored_runs.hpp"
 
@@ -54,6 +55,21 @@ class BackupTest : public RecordingTest {
 
   TestRobot robot_;
 };
+
+TEST_F(BackupTest, AFolderOfAnotherUserIsRefusedWithItsOwner) {
+  if (!may_be_another_user()) GTEST_SKIP() << "only root can be somebody else";
+  config::RecordingConfig config;
+  config.backup_dir = folder_ / "disk";
+  fs::create_directory(folder_ / "disk");
+  fs::permissions(folder_, fs::perms{0755});
+  begin(config);
+  const AnotherUser nobody;
+  const auto begun = wait(recording_->backups.begin("monday"));
+  ASSERT_FALSE(begun);
+  EXPECT_EQ(begun.error().code, ErrorCode::unavailable);
+  EXPECT_THAT(begun.error().detail, HasSubstr("no backup can be written into '" + (folder_ / "disk").string() + "'"));
+  EXPECT_THAT(begun.error().detail, HasSubstr("belongs to root (mode 0755), and this program runs as nobody"));
+}
 
 TEST_F(BackupTest, HoldsEverythingThatWasDurableAndNeedsNoFileBesideIt) {
   begin();
