@@ -57,13 +57,11 @@ std::string progress_of(const json& job) {
 
 json wait_for(const JobCommand& options, std::int64_t id) {
   Progress progress{fmt::format("job {}", id), {.is_json = options.json}};
+  BusyWait busy{options.busy};
   for (;;) {
     StationAnswer answer =
         StationClient{options.data_dir}.ask("GET", fmt::format("{}/{}?wait_ms={}", kJobs, id, kLook_ms));
-    if (gave_way(answer)) {
-      wait_to_ask_again();
-      continue;
-    }
+    if (busy.asks_again(answer)) continue;
     json job = asked(std::move(answer));
     if (!job.at("ended_at_us").is_null()) return job;
     progress.set_detail(fmt::format("{} {}", job.at("state").get<std::string>(), progress_of(job)));

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <iosfwd>
 
+#include "server/cli/accounts/station_client.hpp"
 #include "server/cli/terminal/options.hpp"
 
 namespace CLI {
@@ -24,6 +25,7 @@ struct JobCommand {
   double timeout_s = kLongAnswer_s;
   std::int64_t job = 0;
   bool waits = false;
+  BusyRule busy;  // of a wait
   bool json = false;
 };
 

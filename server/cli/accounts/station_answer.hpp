@@ -29,8 +29,6 @@ inline bool gave_way(const StationAnswer& answer) {
   return answer.status == kUnavailable && answer.body.is_object() && answer.body.value("reason", "") == "busy";
 }
 
-inline constexpr std::chrono::milliseconds kAskAgainAfter{1000};  // then
-
 // How long a tool waits for the station.
 struct TimeLimit {
   std::chrono::microseconds time{std::chrono::seconds{30}};

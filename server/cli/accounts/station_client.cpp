@@ -3,7 +3,6 @@
 
 #include <fmt/format.h>
 
-#include <boost/asio/io_context.hpp>
 #include <optional>
 #include <stdexcept>
 
@@ -64,10 +63,26 @@ std::string token_of(const std::filesystem::path& file) {
 
 }  // namespace
 
-void wait_to_ask_again(std::chrono::milliseconds time) {
-  boost::asio::io_context loop;
-  runtime::SystemClock clock{loop};
-  runtime::run_first(loop, clock.sleep_for(time));
+bool BusyWait::is_busy(const StationAnswer& answer) {
+  if (!gave_way(answer)) {
+    answered_at_us_ = clock_.steady_us();
+    return false;
+  }
+  const microseconds longest = rule_.longest;
+  if (clock_.steady_us() - answered_at_us_ >= longest.count()) {
+    throw std::runtime_error{
+        fmt::format("the station has been busy for {} s: all its connections are taken, and this question gave way to "
+                    "others; what was begun goes on without this command",
+                    std::chrono::duration_cast<std::chrono::seconds>(longest).count())};
+  }
+  return true;
+}
+
+bool BusyWait::asks_again(const StationAnswer& answer) {
+  if (!is_busy(answer)) return false;
+  loop_.restart();
+  runtime::run_first(loop_, clock_.sleep_for(rule_.pause));
+  return true;
 }
 
 nlohmann::json asked(StationAnswer answer) {

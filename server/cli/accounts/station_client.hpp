@@ -2,6 +2,9 @@
 // the database themselves. In TLS only the station with the certificate that the folder announces gets the token.
 #pragma once
 
+#include <boost/asio/io_context.hpp>
+#include <chrono>
+#include <cstdint>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -15,7 +18,28 @@ namespace server::cli {
 // The body of an answer that is a success. Throws std::runtime_error saying what the station refused.
 nlohmann::json asked(StationAnswer answer);
 
-void wait_to_ask_again(std::chrono::milliseconds time = kAskAgainAfter);  // of a question that gave_way()
+// How a tool that waits deals with a station whose places are all taken (503 `busy`): it asks again after a pause, but
+// gives up when every answer of the last minute was `busy`.
+struct BusyRule {
+  std::chrono::milliseconds pause{1000};
+  std::chrono::milliseconds longest{60'000};
+};
+
+class BusyWait {
+ public:
+  explicit BusyWait(BusyRule rule = {}) : rule_{rule} {}
+  // Whether the answer was `busy`. Any other answer begins the time anew. Throws std::runtime_error when the last other
+  // answer was too long ago.
+  bool is_busy(const StationAnswer& answer);
+  // The same; true after the pause.
+  bool asks_again(const StationAnswer& answer);
+
+ private:
+  BusyRule rule_;
+  boost::asio::io_context loop_;
+  runtime::SystemClock clock_{loop_};
+  std::int64_t answered_at_us_ = clock_.steady_us();
+};
 
 // By which id the station knows this invocation of a tool: what it begins is kept alive by it alone. Random, unless the
 // tool goes on with what an earlier invocation began.

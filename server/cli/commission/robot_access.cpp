@@ -282,10 +282,10 @@ json RobotAccess::fit(std::int64_t run_id, std::string& failure) const {
   const auto id = post("/api/v1/jobs", body).at("job_id").get<std::int64_t>();
   const Deadline waits{kFitWaitsUs};
   Deadline computes{kFitWithinUs};
+  BusyWait busy;
   for (;;) {
     const StationAnswer answer = ask("GET", fmt::format("/api/v1/jobs/{}?wait_ms=500", id), nullptr);
-    const bool is_busy = gave_way(answer);
-    if (is_busy) wait_to_ask_again();
+    const bool is_busy = busy.asks_again(answer);
     const json job = is_busy ? json{{"state", "running"}, {"ended_at_us", nullptr}} : asked(answer);
     if (job.at("state") == "done") return job.at("result");
     if (!job.at("ended_at_us").is_null()) {

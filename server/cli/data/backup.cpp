@@ -44,9 +44,10 @@ void check(const Backup& options) {
 }
 
 // The record of that name, as the station reports it now.
-nlohmann::json look(const StationClient& station, const std::string& name) {
-  const StationAnswer answer = station.ask("GET", "/api/v1/backups");
-  for (const auto& backup : answer.body.value("backups", nlohmann::json::array())) {
+nlohmann::json look(const StationClient& station, const std::string& name, BusyWait& busy) {
+  StationAnswer answer = station.ask("GET", "/api/v1/backups");
+  while (busy.asks_again(answer)) answer = station.ask("GET", "/api/v1/backups");
+  for (const auto& backup : asked(std::move(answer)).value("backups", nlohmann::json::array())) {
     if (backup.at("name") == name) return backup;
   }
   throw std::runtime_error{fmt::format("the station no longer knows backup '{}'", name)};
@@ -78,8 +79,9 @@ fs::path let_station_copy(const StationClient& station) {
   if (begun.status != kAccepted) {
     throw std::runtime_error{fmt::format("the station makes no backup: {}", begun.body.value("detail", "no reason"))};
   }
+  BusyWait busy;
   for (;;) {
-    const nlohmann::json backup = look(station, name);
+    const nlohmann::json backup = look(station, name, busy);
     const auto state = backup.at("state").get<std::string>();
     if (state == "done") return backup.at("path").get<std::string>();
     if (state == "failed") {

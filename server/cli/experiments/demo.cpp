@@ -180,7 +180,8 @@ struct Performed {
 // Figure 7. Gives signs of life while it lasts: when they end, the robot stops.
 Performed perform(const StationClient& client, const Narrator& narrator, Patience& patience) {
   Progress progress{narrator};
-  const auto ask = [&client](const std::string& method, const std::string& target, const json& body) {
+  const auto ask = [&client, &patience](const std::string& method, const std::string& target, const json& body) {
+    patience.wait(std::chrono::milliseconds{0});  // throws when the person interrupts it
     return client.ask(method, target, body);
   };
   const std::string robot = fmt::format("/api/v1/robots/{}", kRobot);

@@ -29,7 +29,7 @@ namespace {
 using nlohmann::json;
 
 constexpr int kWatch_ms = 60;  // between two signs of life; each is as old as the one before, and counts for 400 ms
-constexpr int kConflict = 409;
+constexpr int kDone = 200, kConflict = 409;
 constexpr const char* kExperiments = "/api/v1/experiments";
 
 CLI::App* offer(CLI::App& command, ExperimentCommand& options, ExperimentCommand::Act act, const char* name,
@@ -50,11 +50,14 @@ CLI::App* offer_one(CLI::App& command, ExperimentCommand& options, ExperimentCom
   return sub;
 }
 
-json ask_experiments(const StationClient& station, const std::string& method, const std::string& target,
-                     const json& body = nullptr) {
-  const StationAnswer answer = station.ask(method, target, body);
+json accepted(const StationAnswer& answer) {
   if (answer.status >= 200 && answer.status < 300) return answer.body;
   throw std::runtime_error{fmt::format("the station refused: {}", answer.body.value("detail", "no reason"))};
+}
+
+json ask_experiments(const StationClient& station, const std::string& method, const std::string& target,
+                     const json& body = nullptr) {
+  return accepted(station.ask(method, target, body));
 }
 
 std::string text_of(const json& value) { return value.is_null() ? "" : value.get<std::string>(); }
@@ -138,35 +141,62 @@ void say_whose(const StationAnswer& refused) {
   fmt::print(stderr, "rheonaut: this command only looks on: {}\n", one_line(refused.body.value("detail", "")));
 }
 
+// An act that is sent again while the station is busy: SAFETY: a place that was taken loses no pause and no abort.
+class DueAct {
+ public:
+  void is_asked_for(json body) {
+    body_ = std::move(body);
+    is_due_ = true;
+  }
+  void send(const StationClient& station, const std::string& target) {
+    if (is_due_) is_due_ = gave_way(station.ask("POST", target, body_));
+  }
+
+ private:
+  json body_;
+  bool is_due_ = false;
+};
+
 json watch(const StationClient& station, std::int64_t id) {
   ProgressShown progress;
   Interrupt interrupt;
   const Keys keys{::isatty(STDERR_FILENO) != 0};  // where the count-down is shown
   const std::string one = fmt::format("{}/{}", kExperiments, id);
-  bool is_interrupted = false, was_told = false, is_shown = false;
+  bool is_interrupted = false, is_said = false, is_shown = false, is_ours = true;
+  DueAct pause, abort;
   json seen = json::object();  // SAFETY: a sign of life is as old as what this tool has seen of the station
+  BusyWait busy{{.pause = std::chrono::milliseconds{kWatch_ms}}};
   for (;;) {
     // A sign of life, answered without the runs. Refused when it has ended, or when somebody has taken it over: then it
     // is theirs.
     const StationAnswer kept = is_interrupted ? StationAnswer{} : station.ask("POST", one + "/keep-alive", seen);
-    const bool is_ours = kept.status == 200;
-    if (kept.status == kConflict && !std::exchange(was_told, true)) say_whose(kept);
-    if (is_ours) seen["stamp_us"] = kept.body.at("stamp_us");
-    json experiment = is_ours ? kept.body : ask_experiments(station, "GET", one);
-    const bool is_pressed = keys.pressed().has_value();  // before it is said that it matters
-    const bool may_be_paused = is_ours && goes_on_by_itself(experiment);
-    progress.show(experiment, may_be_paused && keys.are_read() ? " (any key pauses it)" : "");
-    if (is_over(experiment)) {
-      progress.end();
-      return is_ours ? ask_experiments(station, "GET", one) : experiment;  // with its runs
+    if (!gave_way(kept)) is_ours = kept.status == kDone;
+    if (kept.status == kConflict && !std::exchange(is_said, true)) say_whose(kept);
+    if (kept.status == kDone) seen["stamp_us"] = kept.body.at("stamp_us");
+    const StationAnswer looked = kept.status == kDone || gave_way(kept) ? kept : station.ask("GET", one);
+    if (!busy.is_busy(looked)) {
+      json experiment = accepted(looked);
+      const bool is_pressed = keys.pressed().has_value();  // before it is said that it matters
+      const bool may_be_paused = is_ours && goes_on_by_itself(experiment);
+      progress.show(experiment, may_be_paused && keys.are_read() ? " (any key pauses it)" : "");
+      if (is_over(experiment)) {
+        progress.end();
+        if (!is_ours) return experiment;
+        StationAnswer with_runs = station.ask("GET", one);
+        while (busy.asks_again(with_runs)) with_runs = station.ask("GET", one);
+        return accepted(with_runs);
+      }
+      // SAFETY: who presses a key while the robot is about to move again decides that it does not.
+      const bool was_shown = std::exchange(is_shown, may_be_paused);
+      if (is_pressed && was_shown) pause.is_asked_for(json::object());
     }
-    // SAFETY: who presses a key while the robot is about to move again decides that it does not.
-    const bool was_shown = std::exchange(is_shown, may_be_paused);
-    if (is_pressed && was_shown) station.ask("POST", one + "/pause", json::object());
-    if (!interrupt.comes_within_ms(kWatch_ms)) continue;
-    if (is_interrupted || !is_ours) throw std::runtime_error{"interrupted; the experiment is still there"};
-    is_interrupted = true;
-    station.ask("POST", one + "/abort", {{"reason", "interrupted"}});
+    pause.send(station, one + "/pause");
+    if (interrupt.comes_within_ms(kWatch_ms)) {
+      if (is_interrupted || !is_ours) throw std::runtime_error{"interrupted; the experiment is still there"};
+      is_interrupted = true;
+      abort.is_asked_for({{"reason", "interrupted"}});
+    }
+    abort.send(station, one + "/abort");
   }
 }
 

@@ -38,17 +38,17 @@ json StationWork::checked(const std::string& method, const std::string& target, 
   return body_of(ask_(method, target, body));
 }
 
-// None: another client needed its place at the station. It waits no longer than a look does, for signs of life go on.
-std::optional<json> StationWork::look_at(const std::string& target) const {
+// None: the station was busy.
+std::optional<json> StationWork::look_at(const std::string& target, BusyWait& busy) const {
   StationAnswer answer = ask_("GET", fmt::format("{}?wait_ms={}", target, kLookMs), nullptr);
-  if (!gave_way(answer)) return body_of(std::move(answer));
-  wait_to_ask_again(std::chrono::milliseconds{kLookMs});
-  return std::nullopt;
+  if (busy.asks_again(answer)) return std::nullopt;
+  return body_of(std::move(answer));
 }
 
 json StationWork::finished_job(std::int64_t job_id) const {
+  BusyWait busy{busy_rule_};
   for (;;) {
-    std::optional<json> job = look_at(fmt::format("/api/v1/jobs/{}", job_id));
+    std::optional<json> job = look_at(fmt::format("/api/v1/jobs/{}", job_id), busy);
     if (!job) continue;
     on_look_(*job);
     if (!job->at("ended_at_us").is_null()) return std::move(*job);
@@ -66,12 +66,13 @@ void StationWork::resume_what_was_left(std::int64_t experiment_id) const {
 json StationWork::finished_experiment(std::int64_t experiment_id) const {
   const std::string target = fmt::format("/api/v1/experiments/{}", experiment_id);
   json seen = json::object();  // SAFETY: a sign of life is as old as what this tool has seen of the station
+  BusyWait busy{busy_rule_};
   for (;;) {
     // Refused for one that has just ended, which the next look shows.
     const StationAnswer kept = ask_("POST", target + "/keep-alive", seen);
     if (kept.status == 200 && kept.body.contains("stamp_us")) seen["stamp_us"] = kept.body.at("stamp_us");
     const bool is_of_others = kept.status == kTakenOver && kept.body.value("reason", "") == "acts_for_another";
-    std::optional<json> experiment = look_at(target);
+    std::optional<json> experiment = look_at(target, busy);
     if (!experiment) continue;
     on_look_(*experiment);
     if (has_ended(*experiment)) return std::move(*experiment);

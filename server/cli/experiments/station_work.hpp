@@ -16,6 +16,8 @@
 namespace server::cli {
 
 inline constexpr int kLookMs = 50;  // signs of life are needed every 150 ms
+// The pause after a busy answer is no longer than a look, for signs of life go on.
+inline constexpr BusyRule kBusyBetweenLooks{.pause = std::chrono::milliseconds{kLookMs}};
 
 using AskStation =
     std::function<StationAnswer(const std::string& method, const std::string& target, const nlohmann::json& body)>;
@@ -25,7 +27,8 @@ using OnLook = std::function<void(const nlohmann::json& job_or_experiment)>;
 
 class StationWork {
  public:
-  StationWork(AskStation ask, OnLook on_look) : ask_{std::move(ask)}, on_look_{std::move(on_look)} {}
+  StationWork(AskStation ask, OnLook on_look, BusyRule busy = kBusyBetweenLooks)
+      : ask_{std::move(ask)}, on_look_{std::move(on_look)}, busy_rule_{busy} {}
 
   nlohmann::json get(const std::string& target) const { return checked("GET", target, nullptr); }
   nlohmann::json post(const std::string& target, const nlohmann::json& body) const {
@@ -41,10 +44,11 @@ class StationWork {
 
  private:
   nlohmann::json checked(const std::string& method, const std::string& target, const nlohmann::json& body) const;
-  std::optional<nlohmann::json> look_at(const std::string& target) const;
+  std::optional<nlohmann::json> look_at(const std::string& target, BusyWait& busy) const;
 
   AskStation ask_;
   OnLook on_look_;
+  BusyRule busy_rule_;
 };
 
 }  // namespace server::cli
