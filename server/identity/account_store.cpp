@@ -223,17 +223,21 @@ Result<ApiToken> AccountStore::revoke_token(const std::string& name, const stati
   return *token;
 }
 
+void AccountStore::note_expiry(const station::Author& by, const std::string& token, std::int64_t expired_at_us) {
+  note(by, "account.token_expired", token, {{"expired_at_us", expired_at_us}});
+}
+
 Result<void> AccountStore::expire_token(const std::string& name, std::int64_t expired_at_us,
                                         const station::Author& by) {
   SQLite::Transaction transaction{database_, SQLite::TransactionBehavior::IMMEDIATE};
   SQLite::Statement expire{database_, "UPDATE api_token SET expired_at_us = ? WHERE name = ? AND expired_at_us = 0"};
   const bool is_new = storage::execute(expire, expired_at_us, name) > 0;
-  if (is_new) note(by, "account.token_expired", name, {{"expired_at_us", expired_at_us}});
+  if (is_new) note_expiry(by, name, expired_at_us);
   transaction.commit();
   return {};
 }
 
-Result<ApiToken> AccountStore::revive_token(const std::string& name, const station::Author& by) {
+Result<ApiToken> AccountStore::revive_token(const std::string& name, std::int64_t seen_us, const station::Author& by) {
   SQLite::Transaction transaction{database_, SQLite::TransactionBehavior::IMMEDIATE};
   std::optional<ApiToken> token = find_token(name);
   if (!token) return unknown("token", name);
@@ -246,7 +250,12 @@ Result<ApiToken> AccountStore::revive_token(const std::string& name, const stati
         fmt::format("token '{}' has expired by this computer's clock; make a new one, or set the clock right", name),
         "token_has_ended");
   }
-  SQLite::Statement revive{database_, "UPDATE api_token SET expired_at_us = 0 WHERE name = ? AND expired_at_us <> 0"};
+  if (token->expired_at_us == 0 && seen_us == 0) {
+    return fail(ErrorCode::conflict, fmt::format("token '{}' has not expired: nothing was changed", name),
+                "token_not_expired");
+  }
+  if (token->expired_at_us == 0) note_expiry({"station", "", by.at_us}, name, seen_us);
+  SQLite::Statement revive{database_, "UPDATE api_token SET expired_at_us = 0 WHERE name = ?"};
   storage::execute(revive, name);
   note(by, "account.token_revived", name, nlohmann::json::object());
   transaction.commit();

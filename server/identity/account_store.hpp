@@ -55,8 +55,10 @@ class AccountStore {
   Result<void> add_token(const ApiToken& token, const station::Author& by);
   Result<ApiToken> revoke_token(const std::string& name, const station::Author& by);
   Result<void> expire_token(const std::string& name, std::int64_t expired_at_us, const station::Author& by);
-  // Of one that has expired by a clock that was wrong. conflict: it was revoked, or has expired by `by.at_us`, too.
-  Result<ApiToken> revive_token(const std::string& name, const station::Author& by);
+  // A token that has expired by a clock that was wrong holds again. `seen_us`: when the station saw it expire, which
+  // the disk may not know yet; 0: it has not. conflict: it has not expired, it was revoked, or it has expired by
+  // `by.at_us`, too.
+  Result<ApiToken> revive_token(const std::string& name, std::int64_t seen_us, const station::Author& by);
 
   // Everything that is in `sessions` is stored then, and nothing else; the tokens were last used then.
   void replace_sessions(const std::vector<PageSession>& sessions, std::uint64_t next_session,
@@ -74,6 +76,7 @@ class AccountStore {
   std::optional<ApiToken> find_token(const std::string& name);
   std::optional<Enrolment> find_robot(const std::string& robot_id);
   std::size_t count(const char* sql);
+  void note_expiry(const station::Author& by, const std::string& token, std::int64_t expired_at_us);
   void note(const station::Author& by, const char* action, const std::string& subject, const nlohmann::json& detail);
 
   SQLite::Database& database_;

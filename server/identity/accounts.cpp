@@ -347,7 +347,9 @@ asio::awaitable<Result<ApiToken>> Accounts::revive_token(std::string name, stati
   if (found == tokens_.end())
     co_return fail(ErrorCode::not_found, fmt::format("there is no token '{}'", name), "unknown_name");
   const bool was_stored = std::exchange(found->is_expiry_stored, true);  // nothing comes to the disk behind this
-  auto job = [name, by](AccountStore& store) { return store.revive_token(name, by); };
+  auto job = [name, by, seen_us = found->expired_at_us](AccountStore& store) {
+    return store.revive_token(name, seen_us, by);
+  };
   auto revived = co_await on_store(std::move(job));
   if (revived && found->revoked_at_us != 0)
     revived = std::unexpected{has_ended_for_good(name)};  // the disk knows it later

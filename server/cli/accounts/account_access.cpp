@@ -6,12 +6,13 @@
 #include <termios.h>
 #include <unistd.h>
 
+#include <functional>
 #include <iostream>
 #include <stdexcept>
 
 #include "server/cli/accounts/author.hpp"
-
 #include "server/runtime/private_file.hpp"
+
 namespace server::cli {
 namespace fs = std::filesystem;
 using nlohmann::json;
@@ -102,13 +103,22 @@ void AccountAccess::add_user(const std::string& name, identity::Role role, const
   value_of(store().add_user({name, role, runtime::hash_password(password, {}), by.at_us, by.actor, false}, by));
 }
 
-void AccountAccess::change_user(const std::string& name, const identity::UserChange& change, const json& body) {
+template <class Change>
+void AccountAccess::act(const std::string& list, const std::string& name, const std::string& act, const json& body,
+                        const Change& change) {
   value_of(identity::check_name(name));
   if (station_) {
-    ask("POST", "/users/" + name + "/change", body);
+    ask("POST", fmt::format("/{}/{}/{}", list, name, act), body);
   } else {
-    value_of(store().change_user(name, change, command_line_author()));
+    identity::AccountStore accounts = store();
+    value_of(std::invoke(change, accounts, name, command_line_author()));
   }
+}
+
+void AccountAccess::change_user(const std::string& name, const identity::UserChange& change, const json& body) {
+  act("users", name, "change", body, [&change](auto& accounts, const std::string& user, const station::Author& by) {
+    return accounts.change_user(user, change, by);
+  });
 }
 
 void AccountAccess::set_role(const std::string& name, identity::Role role) {
@@ -127,12 +137,7 @@ void AccountAccess::set_disabled(const std::string& name, bool disabled) {
 }
 
 void AccountAccess::remove_user(const std::string& name) {
-  value_of(identity::check_name(name));
-  if (station_) {
-    ask("POST", "/users/" + name + "/remove");
-  } else {
-    value_of(store().remove_user(name, command_line_author()));
-  }
+  act("users", name, "remove", nullptr, &identity::AccountStore::remove_user);
 }
 
 json AccountAccess::tokens() { return station_ ? ask("GET", "/tokens").at("tokens") : list_of(store().load().tokens); }
@@ -158,21 +163,13 @@ json AccountAccess::add_token(const std::string& name, identity::Scopes scopes, 
 }
 
 void AccountAccess::revoke_token(const std::string& name) {
-  value_of(identity::check_name(name));
-  if (station_) {
-    ask("POST", "/tokens/" + name + "/revoke");
-  } else {
-    value_of(store().revoke_token(name, command_line_author()));
-  }
+  act("tokens", name, "revoke", nullptr, &identity::AccountStore::revoke_token);
 }
 
 void AccountAccess::revive_token(const std::string& name) {
-  value_of(identity::check_name(name));
-  if (station_) {
-    ask("POST", "/tokens/" + name + "/revive");
-  } else {
-    value_of(store().revive_token(name, command_line_author()));
-  }
+  act("tokens", name, "revive", nullptr, [](auto& accounts, const std::string& token, const station::Author& by) {
+    return accounts.revive_token(token, 0, by);
+  });
 }
 
 json AccountAccess::enrolments() {

@@ -41,6 +41,10 @@ class AccountAccess {
 
  private:
   nlohmann::json ask(const std::string& method, const std::string& target, const nlohmann::json& body = nullptr) const;
+  // Changes the entry of this name: by POST /api/v1/LIST/NAME/ACT, or by `change` of the store where no station runs.
+  template <class Change>
+  void act(const std::string& list, const std::string& name, const std::string& act, const nlohmann::json& body,
+           const Change& change);
   void change_user(const std::string& name, const identity::UserChange& change, const nlohmann::json& body);
   identity::AccountStore store() { return identity::AccountStore{database_->handle()}; }
 

@@ -73,7 +73,7 @@ void add_options(CLI::App& command, TokenCommand& options) {
       ->required()
       ->check(named());
   offer(command, options, TokenCommand::Act::revive, "revive",
-        "Let a token hold again that a wrong clock has let expire")
+        "Let a token hold again that expired while this computer's clock was ahead")
       ->add_option("name", options.name, "What it is called")
       ->required()
       ->check(named());

@@ -1,4 +1,7 @@
 // Users, tokens and enrolments: what is kept, what a restart finds, and what a disk that cannot be written spoils.
+#include <gmock/gmock.h>
+
+#include <algorithm>
 #include <fstream>
 #include <future>
 
@@ -88,6 +91,10 @@ class ExpiredTokenTest : public AccountsTest {
   bool holds() { return accounts().caller_of_token(secret).has_value(); }
   Answered revive() { return ask("POST", "/api/v1/tokens/logger/revive"); }
   json listed() { return ask("GET", "/api/v1/tokens").parsed()["tokens"][0]; }
+  std::ptrdiff_t audited(const std::string& action) {
+    const json entries = ask("GET", "/api/v1/audit").parsed()["entries"];
+    return std::ranges::count_if(entries, [&action](const json& entry) { return entry["action"] == action; });
+  }
   void let_expire(microseconds jump) {
     clock.step_utc(jump);
     clock.run_for(2s);
@@ -116,6 +123,27 @@ TEST_F(ExpiredTokenTest, StaysRefusedWhenTheClockGoesBackUntilItIsRevived) {
   EXPECT_EQ(ask("POST", "/api/v1/tokens/logger/revoke").status, 200);
   EXPECT_EQ(revive().status, 409);
   EXPECT_FALSE(holds());
+}
+
+TEST_F(ExpiredTokenTest, ThatHasNotExpiredIsNotRevivedAndNotAudited) {
+  const Answered answer = revive();
+  EXPECT_EQ(answer.status, 409);
+  EXPECT_EQ(answer.parsed()["reason"], "token_not_expired");
+  EXPECT_THAT(answer.parsed()["detail"].get<std::string>(), ::testing::HasSubstr("nothing was changed"));
+  EXPECT_EQ(audited("account.token_revived"), 0);
+  EXPECT_TRUE(holds());
+}
+
+TEST_F(ExpiredTokenTest, IsAuditedAsExpiredBeforeItIsRevived) {
+  clock.step_utc(192h);
+  EXPECT_FALSE(holds());
+  clock.step_utc(-192h);  // before the disk has heard of it
+  EXPECT_EQ(revive().status, 200);
+  EXPECT_TRUE(holds());
+  clock.run_for(2min);
+  EXPECT_EQ(audited("account.token_expired"), 1);
+  EXPECT_EQ(audited("account.token_revived"), 1);
+  EXPECT_TRUE(stored().caller_of_token(secret));
 }
 
 TEST_F(ExpiredTokenTest, EndsForGoodWhenTheClockHasStoodByItForADay) {
