@@ -74,7 +74,7 @@ struct StepBegin {
   std::uint64_t robot_time_us = 0;
 };
 
-// Whether what is left of a line keeps within its limits from this position; or why not, or why that cannot be told.
+// Whether what is left of a line keeps within its limits from this position; or why not, or why that is not known.
 using TravelCheck = std::function<boost::asio::awaitable<Result<void>>(TimeLine rest, double position_m)>;
 
 // What somebody else's command to the robot means for a run; `peer` is that of the run's own commands. None: nothing.
@@ -216,7 +216,7 @@ class RunDriver {
   bool makes_room_ = false;                   // before it goes on the robot goes back to 0
   std::optional<Abort> no_room_;              // it cannot go on, as far as is known
   int ways_back_ = 0;                         // so far
-  int told_to_rest_ = 0;                      // how often a pause or an interruption was asked for
+  int rests_ordered_ = 0;                     // how often a pause or an interruption was asked for
   std::uint64_t seen_robot_us_ = 0;           // latest sample of this boot
   int link_losses_ = 0;
   std::uint64_t driven_robot_us_ = 0;      // latest sample of this boot with the motor on, or in auto

@@ -22,7 +22,7 @@ constexpr std::uint64_t kLongestLeaseUs = 600'000;
 
 // SAFETY: also while it is interrupted: then it does not go on by itself any more.
 void RunDriver::pause(std::string reason, std::string detail) {
-  ++told_to_rest_;
+  ++rests_ordered_;
   pause_.emplace(Abort{std::move(reason), std::move(detail)}, parts_.clock.steady_us());
   changed_.notify();
 }
@@ -38,7 +38,7 @@ void RunDriver::interrupt(Abort why) {
 }
 
 void RunDriver::pause_for(Pause pause) {
-  ++told_to_rest_;
+  ++rests_ordered_;
   // SAFETY: what is late on the way back takes no person's pause away.
   if (pause_ && !pause_->goes_back && (!pause_->ends_by_itself || pause.ends_by_itself)) return;
   pause_ = std::move(pause);
@@ -69,7 +69,7 @@ asio::awaitable<void> RunDriver::stay_paused() {
     const auto is_away = [&] {
       return losses != link_losses_ || parts_.station.find(request_.robot_id)->link != station::LinkState::connected;
     };
-    // SAFETY: whoever stands there was told the other direction.
+    // SAFETY: a person beside the robot expects the other direction.
     if (was_to_make_room != makes_room_) pause_->goes_on_at_us = 0;
     is_over = !abort_ && !is_away() && is_over_pause(*parts_.station.find(request_.robot_id), true);
     if (is_over && no_room_) abort(*no_room_);
@@ -92,7 +92,7 @@ asio::awaitable<void> RunDriver::stay_paused() {
 // In closed loop, by the same rules as a step of the line, until the robot is at rest; what is late or speaks against
 // it breaks it off.
 asio::awaitable<void> RunDriver::go_back() {
-  const int told = told_to_rest_;
+  const int ordered = rests_ordered_;
   ++ways_back_;
   pause_->goes_back = true;
   pause_->goes_on_at_us = 0;
@@ -104,13 +104,13 @@ asio::awaitable<void> RunDriver::go_back() {
   way_feed_.emplace(*request_.way_back, 0, begins_us);
   for (;;) {
     const station::RobotState& robot = *parts_.station.find(request_.robot_id);
-    if (told == told_to_rest_) {
+    if (ordered == rests_ordered_) {
       if (const auto& found = watch_.fault()) abort(*found);
       if (!abort_) watch_samples();
       if (!abort_) watch(robot);
     }
     const bool is_over = way_feed_->is_over(robot.latest_robot_time_us) && on_their_way_ == 0;
-    if (abort_ || told != told_to_rest_ || is_over) break;
+    if (abort_ || ordered != rests_ordered_ || is_over) break;
     feed(robot);
     co_await changed_.wait_until(parts_.clock, parts_.clock.steady_us() + kTurn.count());
   }
