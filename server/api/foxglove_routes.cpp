@@ -45,7 +45,7 @@ http::Answer make_link(FoxgloveRoutes parts, http::Request request) {
   co_return http::json_response(201, {{"url", url}, {"expires_at_us", ends_at_us}});
 }
 
-// Of a request that is no upgrade to WebSocket.
+// Answers a request that is no upgrade to WebSocket.
 http::Answer without_upgrade(FoxgloveRoutes parts, http::Request) {
   if (!parts.is_enabled) co_return is_off();
   http::Response response = http::problem(426, "/foxglove speaks WebSocket only", "upgrade_required");

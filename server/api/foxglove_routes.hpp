@@ -23,7 +23,7 @@ struct FoxgloveRoutes {
 
 void add_foxglove_routes(http::Router& router, const FoxgloveRoutes& parts);
 
-// Of /foxglove.
+// The upgrade of /foxglove to a WebSocket.
 http::Upgrade foxglove_upgrade(const FoxgloveRoutes& parts);
 
 }  // namespace server::api

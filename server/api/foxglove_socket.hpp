@@ -16,8 +16,8 @@
 
 namespace server::api {
 
-// Of the sub-protocols that a client offers, as in Sec-WebSocket-Protocol, the one to be spoken; empty: none is known.
-// What is served of both is the same.
+// The sub-protocol to be spoken, of those that a client offers in Sec-WebSocket-Protocol; empty: none is known. Both
+// that are known get the same messages.
 std::string foxglove_protocol(const std::string& offered);
 
 // Everything outlives every client.

@@ -233,7 +233,7 @@ std::optional<int> answer(const CommandLine& line, std::ostream& out) {
 
 namespace {
 
-// What somebody else may have made, of what the command reads.
+// The file that the command reads and that somebody else may have made.
 std::optional<ForeignFile> foreign_file(const CommandLine& line) {
   if (const auto* archive = std::get_if<Reproduce>(&line)) return ForeignFile{archive->file, {}};
   if (const auto* backup = std::get_if<Restore>(&line)) {

@@ -24,7 +24,7 @@ struct DutyChange {
 // Ascending, the first at tick 0; without changes to the same duty. Not of a step that is_closed_loop().
 std::vector<DutyChange> duty_changes(const Step& step);
 
-// Of any step but a scan, whose duration depends on where it begins.
+// The duration of any step but a scan, whose duration depends on where it begins.
 std::uint64_t ticks_of(const Step& step);
 
 // Whole periods in for_s, ascending, each once (2).

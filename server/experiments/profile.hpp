@@ -68,7 +68,7 @@ struct Conditions {
   StartPosition start = StartPosition::zero;
 };
 
-// Of what a profile may ask for, checked when it is read; the limits of the station hold as well.
+// The limits of what a profile may ask for, checked when it is read; the limits of the station hold as well.
 struct ProfileLimits {
   double position_min_m = -1, position_max_m = 1;
   double duty_max = 1;  // magnitude

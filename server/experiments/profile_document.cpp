@@ -217,7 +217,7 @@ void check_setpoint(const Step& step, const Profile& profile) {
   }
 }
 
-// Of the newest step, with those before it.
+// Checks the newest step together with those before it.
 void check_newest_step(const Profile& profile) {
   const Step& step = profile.steps.back();
   if (profile.steps.size() > kMostSteps) base::throw_invalid("there are more than ", kMostSteps, " steps");

@@ -33,7 +33,7 @@ struct TimeLine {
 // kModeChangeTicks at duty 0 or at the beginning of its scan; a setpoint is kept for as long.
 TimeLine time_line_of(const Profile& profile, const Variant& variant);
 
-// Of all variants.
+// The duration of the longest of all variants.
 double longest_duration_s(const Profile& profile);
 
 }  // namespace server::experiments

@@ -10,8 +10,8 @@
 namespace server::http {
 namespace {
 
-// Of the policy: nothing but what the cockpit is made of, from this origin; nothing inline; no frame around it. Of the
-// permissions: what the page asks no browser for.
+// The policy allows nothing but the files of the cockpit, from this origin; nothing inline; no frame around it. The
+// permissions refuse everything that the page does not ask a browser for.
 constexpr auto kSecurityFields =
     "Server: rheonaut\r\n"
     "Content-Security-Policy: default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self'; font-src "

@@ -28,7 +28,7 @@ inline constexpr microseconds kWriteTime{std::chrono::seconds{30}};
 
 enum class Next : std::uint8_t { another, end };  // request on this connection
 
-// Of a request, in the log.
+// The name of a request in the log.
 std::string route_of(std::string_view method, std::string_view target);
 
 // What the work gives, or nothing when the client goes first: the work is cancelled then, and has ended.

@@ -10,7 +10,7 @@ namespace server::http {
 
 using HttpStream = tls::StreamSocket;
 
-// Of the client, without its port.
+// The client's address without its port.
 inline std::string address_of(const HttpStream& stream) { return config::host_of(stream.peer()); }
 
 }  // namespace server::http

@@ -27,7 +27,7 @@ class RequestGuard {
 
   // Who asks (nobody where nobody needs to say), or the refusal.
   std::expected<identity::Caller, Response> admit(const Request& request) const;
-  // Of a head alone; `has_body` says whether one follows.
+  // Decides by the head alone; `has_body` says whether a body follows.
   std::expected<identity::Caller, Response> admit(const Request& request, bool has_body) const;
 
  private:
@@ -44,7 +44,7 @@ class RequestGuard {
   const char* scheme_;
 };
 
-// Of the first cookie of this name in "a=1; b=2"; empty when there is none.
+// The value of the first cookie of this name in "a=1; b=2"; empty when there is none.
 std::string cookie_value(const std::string& header, const std::string& name);
 
 }  // namespace server::http

@@ -1,4 +1,4 @@
-// Of Beast's messages and errors, what the connection judges by.
+// Reads Beast's messages and errors as the connection needs them.
 #include "server/http/request_reading.hpp"
 
 #include <fmt/format.h>

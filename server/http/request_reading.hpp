@@ -28,7 +28,7 @@ Request plain_head(const RequestMessage& message);
 // before; another program on the way may take it for a field of its own, and read another length of the body.
 bool has_folded_line(std::string_view head);
 
-// Which of them names the station is in doubt (RFC 9112, section 3.2).
+// Whether a request has two Host fields: then it is in doubt which names the station (RFC 9112, section 3.2).
 bool has_two_hosts(const RequestMessage& message);
 
 // The length of what follows the header is not known: Beast takes a coding that it does not know for no body at all.
@@ -49,9 +49,9 @@ class HeaderFields {
 };
 
 Response body_too_large(std::size_t limit);
-// Of a header that is within Beast's own limit: 414 or 431, if any.
+// The refusal, 414 or 431, of a header that is within Beast's own limit; none where it is short enough.
 std::optional<Response> header_too_large(const RequestMessage& message);
-// To what the parser refused; none when the client has gone.
+// The answer to a request that the parser refused; none when the client has gone.
 std::optional<Response> unreadable(boost::system::error_code error);
 
 }  // namespace server::http

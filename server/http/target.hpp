@@ -22,7 +22,7 @@ class Target {
   const std::string& text() const { return text_; }            // from its path on
   const std::string& authority() const { return authority_; }  // empty when it is not in the absolute form
   bool is_acceptable() const { return !segments_.empty(); }
-  // Of the path, split and then decoded; at least one. None, and an empty path, when it is not acceptable.
+  // The segments of the path, split and then decoded; at least one. None, and an empty path, when it is not acceptable.
   const std::vector<std::string>& segments() const { return segments_; }
   const std::string& path() const { return path_; }
   // Names and values, decoded, in their order; empty when it is not a valid encoding.

@@ -29,7 +29,7 @@ struct StoredAccounts {
   std::vector<std::string> revoked_robots;
 };
 
-// What of a user changes; empty: it stays.
+// The fields of a user that change; an empty one stays.
 struct UserChange {
   std::optional<Role> role;
   std::optional<std::string> password_hash;

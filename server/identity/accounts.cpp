@@ -24,7 +24,7 @@ std::string actor_of(const std::string& user, std::uint64_t session) {
   return user.empty() ? fmt::format("session:{}", session) : fmt::format("user:{}/session:{}", user, session);
 }
 
-// What was taken away stays away while the station runs, but the disk does not know it.
+// A right that was taken away stays away while the station runs, but the disk does not know it.
 Error not_stored(Error error) {
   if (error.code != ErrorCode::unavailable) return error;
   error.detail += ". It is in force, and a restart would undo it: do what GET /api/v1/recording says, and ask again";
@@ -103,7 +103,8 @@ asio::awaitable<bool> Accounts::save() {
   co_return true;
 }
 
-// That tokens have expired, for the next start; and their end for good, when the clock that said so has proved right.
+// Stores which tokens have expired, for the next start, and ends those for good that a clock has ended which proved
+// right.
 asio::awaitable<bool> Accounts::store_expired() {
   for (Token& token : tokens_) {
     if (token.expired_at_us == 0 || token.revoked_at_us != 0) continue;
@@ -251,7 +252,7 @@ asio::awaitable<Result<User>> Accounts::change_user(std::string name, UserChange
     const std::string now = is_out ? "disabled" : fmt::format("made {}", text(known->second.role));
     end_rights_of(name, left, fmt::format("user '{}' was {} by {}", name, now, by.actor));
   }
-  // Somebody else who sets a password takes the pages from whoever has opened them.
+  // Somebody else who sets a password takes the pages from the person who opened them.
   if (known != users_.end() && change.password_hash && !is_of(by.actor, name)) {
     end_pages_of(name, by.actor);
   }

@@ -76,7 +76,8 @@ class Accounts {
   boost::asio::awaitable<Result<User>> change_user(std::string name, UserChange change, station::Author by);
   boost::asio::awaitable<Result<void>> remove_user(std::string name, station::Author by);
 
-  // Whose an actor is: a token of a user is theirs ("user:anna"), a page as well; else the actor itself.
+  // The account that an actor belongs to: the user ("user:anna") of a token or a page that has one; else the actor
+  // itself.
   std::string account_of(const std::string& actor) const;
   bool is_account(const std::string& account) const;  // somebody may sign in as, or use, it now
 

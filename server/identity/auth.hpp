@@ -28,7 +28,7 @@ class Auth {
   // The secret of a new session, for its cookie; empty when the code is unknown, used or too old.
   std::optional<std::string> log_in(const std::string& code, const std::string& peer, const std::string& agent);
 
-  // Whose it is; empty when nobody's. A session that is used is renewed.
+  // The caller whose token or session this is; none: nobody's. A session that is used is renewed.
   std::optional<Caller> caller_of_token(const std::string& token) const;
   std::optional<Caller> caller_of_session(const std::string& secret) const;
 

@@ -18,14 +18,14 @@ struct Refusal {
   std::string detail;  // for people
 };
 
-// Of a Hello that says what cannot be, or speaks another version; nothing when it may be admitted: the archive does not
+// The refusal of a Hello that is impossible, or of another version; none when it may be admitted: the archive does not
 // judge its numbers again.
 std::optional<Refusal> refusal_of(const protocol::Hello& hello, std::uint64_t robot_time_us);
-// Of a Hello that does not decode, since a text in it is longer than it may be.
+// The refusal of a Hello that does not decode, since a text in it is longer than it may be.
 Refusal refusal_of_too_long_hello();
 // Whether the payload is a RobotFrame with a Hello in it, whatever that says.
 bool has_hello(protocol::Bytes payload);
-// Of a robot that the archive does not admit.
+// The refusal of a robot that the archive does not admit.
 std::optional<Refusal> refusal_of(const station::Admission& admission);
 
 // What the archive is asked. `robot_time_us` is that of the Hello's frame, `received_at_us` UTC.

@@ -95,7 +95,7 @@ class RobotSession final : public station::RobotLink {
   runtime::Signal wake_writer_;     // something is ready that flush() could not write
   RobotOutbox outbox_;
 
-  station::StopPath stop_path_;  // as the station was told
+  station::StopPath stop_path_;  // as the station has it
 
   std::int64_t last_received_us_ = 0;
   std::int64_t prompt_until_us_ = 0;              // what comes is read promptly, even if nobody waits for it

@@ -279,7 +279,7 @@ void LiveFeed::on_event(const station::RobotState&, const station::RobotEvent& e
   if (events_.size() == kMaxLog) publish_log();
 }
 
-// Of renewals only that they are refused now, and why: once, until one succeeds again.
+// A renewal is news only when it is refused: once, until one succeeds again.
 bool LiveFeed::is_news(const station::CommandRecord& record) {
   if (record.kind != "renew_lease") return true;
   std::string& refusal = robots_[record.robot_id].renewal_refusal;

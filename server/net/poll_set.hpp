@@ -98,7 +98,7 @@ class PollSet::Socket {
   // cancelled, no_memory when the system cannot watch it.
   boost::asio::awaitable<void> writable();
 
-  // Of what comes from now on, and of what is unread; prompt until it is set.
+  // The pace at which unread and later bytes are reported; prompt until it is set.
   void set_pace(ReadPace pace);
 
  private:

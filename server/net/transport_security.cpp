@@ -59,7 +59,7 @@ ConnectionLimits limits(const config::PortPlaces& places, std::size_t unauthenti
   return {places.connections, unauthenticated, places.of_address, places.connections - places.connections / 4, 0};
 }
 
-// Of a request it is known at once who makes it, of a robot after its hello.
+// The sender of a request is known at once, a robot after its hello.
 ConnectionLimits http_limits(const config::PortPlaces& places) {
   ConnectionLimits of_http = limits(places, places.connections);
   of_http.reserve = 16;

@@ -24,7 +24,7 @@ bool is_c1(std::string_view text, std::size_t at) {
 }
 
 // SAFETY: the message with every control character written out: no text of a peer can begin a line of its own, or
-// command the terminal of whoever reads the log.
+// command the terminal of a person who reads the log.
 class OneLine final : public spdlog::custom_flag_formatter {
  public:
   void format(const spdlog::details::log_msg& entry, const std::tm&, spdlog::memory_buf_t& out) override {

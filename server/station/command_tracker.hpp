@@ -61,7 +61,7 @@ class CommandTracker {
   // SAFETY: a stop is kept until a robot acknowledges it; everything else ends with the link.
   void end_with_link(RobotEntry& entry, const char* reason);
 
-  // Of commands that were sent and have no answer: what samples prove.
+  // Ends commands that were sent and have no answer, where samples prove what became of them.
   void settle_unanswered(RobotEntry& entry, const SampleBatch& batch);
 
  private:

@@ -31,7 +31,7 @@ class EmergencyStops {
   void on_connected(RobotEntry& entry, bool lost_its_latch, std::vector<CommandRecord>& to_publish);
   // SAFETY: a stop that a connected robot leaves unanswered is sent again each second, under the same id.
   void repeat(RobotEntry& entry, std::vector<CommandRecord>& to_publish);
-  // Of an earlier run of the station.
+  // Takes over a stop of an earlier run of the station.
   void restore(RobotEntry& entry, const CommandRecord& record);
 
   // The stops that this answer to one of them settles, each with its reason. Empty when the robot has not obeyed.

@@ -108,7 +108,7 @@ class Station {
   void remember(const CommandRecord& ended);
 
   const StopTimes& stop_times() const;
-  // Of heartbeats of all robots: there and back, without the time that the robot took to answer.
+  // Round-trip times of the heartbeats of all robots, without the robots' processing time.
   const runtime::TimeHistogram& round_trips() const;
   std::uint64_t invalid_values() const;   // of all robots, since the station started
   std::uint64_t events_left_out() const;  // of all robots, since the station started

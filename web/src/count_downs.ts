@@ -3,7 +3,7 @@
 import { counts_down } from './experiments_store';
 import type { Session } from './session';
 
-// Of those in the hands of this page.
+// Pauses the experiments in the hands of this page that count down.
 // SAFETY: who presses anything while a robot is about to move again by itself decides that it does not.
 export function pause_count_downs({ store, experiments }: Pick<Session, 'store' | 'experiments'>): void {
   for (const id of store.experiments.kept_by(store.actor.peek(), store.client.peek())) {

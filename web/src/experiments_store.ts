@@ -16,7 +16,7 @@ export const has_ended = (experiment: Pick<ExperimentSummary, 'state'>) => !kOpe
 export const counts_down = ({ progress }: Pick<ExperimentSummary, 'progress'>) =>
   typeof progress?.goes_on_in_s === 'number';
 
-// Of a page, or a script, by its actor and its id.
+// Whether a page, or a script, holds the experiment, by its actor and its id.
 export const is_in_hands_of = (
   experiment: Pick<ExperimentSummary, 'acts_for' | 'client'>,
   actor: string,

@@ -18,7 +18,7 @@ function scaled(value: number | null | undefined, factor: number, decimals: numb
 export const millimetres = (length_m: number | null | undefined, decimals = 1) => scaled(length_m, 1e3, decimals);
 // How many standard deviations stand behind each "±" of the page.
 export const kSpread_sd = 2;
-// Of an estimate, as "± 1.6".
+// The spread of an estimate, as "± 1.6".
 export const plus_minus = (sd_m: number | null | undefined) =>
   `± ${millimetres(sd_m === null || sd_m === undefined ? null : kSpread_sd * sd_m)}`;
 // Beside a plot whose axis does not show all of the band; the distance from the estimate to its edge, at most.
@@ -35,7 +35,7 @@ export const count = (value: number | null | undefined) =>
     ? kMissing
     : Math.round(value).toLocaleString('en').replaceAll(',', '\u202f').replace('-', kMinus);
 
-// Of a file or a disk: "640 kB", "12.4 GB".
+// The size of a file or a disk: "640 kB", "12.4 GB".
 export function bytes(size: number): string {
   const units = ['B', 'kB', 'MB', 'GB', 'TB'];
   let [value, at] = [size, 0];

@@ -37,7 +37,7 @@ export function useCloseOnEscape(close: () => void): void {
   }, []);
 }
 
-// A menu of the browser is a native pop-up as well. With Shift it opens all the same, for whoever looks into the page; a
+// A menu of the browser is a native pop-up as well. With Shift it opens all the same, for a developer; a
 // touch screen has no Escape, and its menus stay.
 export function keep_menus_shut(target: Pick<Window, 'addEventListener'>): void {
   target.addEventListener('contextmenu', (event) => {

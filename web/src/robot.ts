@@ -11,7 +11,7 @@ const kSettle_ms = 500;
 const kModelConfirmed = 64; // of flags
 const kModelMismatch = 128;
 
-// Whose model the estimator has, and whether it is that of the fluid; empty where the position is no estimate. `sent`:
+// The model that the estimator has, and whether it is that of the fluid; empty where the position is no estimate. `sent`:
 // what the station has sent to the robot.
 export function model_of(flags: number, position_sd_m: number | null, sent?: RobotModel): string {
   if (position_sd_m === 0) return '';
@@ -188,7 +188,7 @@ export class Robot {
     this.watched = watched;
   }
 
-  // Of the position at that moment; null: what the page received last is of another one.
+  // The sd of the position at that moment; null: the newest sample of the page is of another moment.
   position_sd_m_at(boot_id: string | null, robot_time_us: number | null): number | null {
     const newest = this.watched && this.latest ? end_of_samples(this.latest) : end_of_state(this.state.peek());
     if (robot_time_us === null || boot_id === null || boot_id !== newest.boot_id) return null;

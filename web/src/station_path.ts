@@ -91,7 +91,7 @@ export class StationPath {
     return (now_ms - this.least_ms + (this.round_trip_ms ?? 0) / 2) * 1000;
   }
 
-  // That time in UTC, by the station's clock.
+  // The time in UTC, by the station's clock.
   station_utc_us(now_ms: number): number | null {
     const station_us = this.station_us(now_ms);
     return station_us === null || this.utc_offset_us === null ? null : station_us + this.utc_offset_us;

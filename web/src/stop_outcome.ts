@@ -25,7 +25,7 @@ const kMaxNamed = 100; // as the station's own summary
 
 type Named = StopSummary['not_acknowledged'][number]['outcome'];
 
-// Of a station that answers without a summary, and of one robot.
+// The outcome of a stop by its command records: of one robot, or of a station that answers without a summary.
 export function outcome_of(records: CommandRecord[]): StopOutcome {
   const of = (named: Named) => records.filter((record) => outcome_of_state(record.state) === named);
   const [failed, unanswered, kept] = [of('failed'), of('unanswered'), of('kept')];

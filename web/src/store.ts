@@ -54,7 +54,7 @@ export class Store {
 
   constructor(private readonly clocks: { page_ms(): number; utc_ms(): number }) {}
 
-  // The robots that whoever looks at this page controls.
+  // The robots that the user of this page controls.
   controlled(): string[] {
     const is_ours = (robot: Robot) => robot.state.peek().control?.holder === this.actor.peek();
     const ours = this.robots.peek().filter(is_ours);
@@ -256,7 +256,7 @@ export class Store {
     else this.wanted_id = robot_id;
   }
 
-  // Whoever orders something of the robot that is selected has chosen it.
+  // A command to the robot that is selected is a choice of it.
   keep_selected(): void {
     if (this.selected_id.peek() !== null) this.is_chosen.value = true;
   }

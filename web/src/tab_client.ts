@@ -35,7 +35,7 @@ export class TabClient {
     }
   }
 
-  // Of the WebSocket, where a browser sends no headers of ours.
+  // The query of the WebSocket, where a browser sends no headers of ours.
   query = (): string => `client=${this.id}&page=${this.page}`;
 }
 

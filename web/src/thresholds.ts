@@ -64,7 +64,7 @@ export class Thresholds {
   }
 }
 
-// Of one robot: what is beyond a threshold, or was and has not been acknowledged.
+// The readings of one robot that are beyond a threshold, or were and have not been acknowledged.
 export class Alerts {
   readonly alerts = signal<readonly Alert[]>([]);
 

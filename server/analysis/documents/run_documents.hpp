@@ -1,6 +1,6 @@
 // Gathers what a document about runs needs, and has it made on a worker: metrics, traces, impedance maps, reports.
 //
-// Metrics of a run that has ended are kept. Runs are read one after another; between them `watch` is told how far it is
+// Metrics of a run that has ended are kept. Runs are read one after another; `watch` gets the progress between them
 // and may end it. Loop thread; the parts outlive it. Errors: those of the parts; a run that has not what it is to be
 // aligned at is named.
 #pragma once

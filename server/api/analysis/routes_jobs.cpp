@@ -34,7 +34,7 @@ std::optional<control::FractionalModel> plant_of(const station::FluidModel& mode
   return plant ? std::optional{*plant} : std::nullopt;
 }
 
-// Of a fluid: the model that robots in it are sent.
+// The model that robots in this fluid are sent.
 std::optional<analysis::ModelInUse> model_in_use(JobRoutes parts, const std::string& fluid) {
   const station::FluidModel* model = parts.fluid_models.in_force().find(fluid);
   const auto plant = model == nullptr ? std::nullopt : plant_of(*model);

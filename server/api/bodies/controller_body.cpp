@@ -92,7 +92,8 @@ Result<void> add_second_order(const json& section, double& direct, protocol::Con
   return append(out.biquad_a2, out.biquad_a2_count, kName, a2);
 }
 
-// Of what `rheonaut discretise --json` prints only what the robot needs; the rest explains it to people.
+// Reads only the members that the robot needs; the rest of what `rheonaut discretise --json` prints explains it to
+// people.
 Result<void> read_sections(const Members& given, protocol::Controller& out) {
   constexpr double kUsPerS = 1e6;
   constexpr Range<double> kPeriods_s = numbers("DiscretisedController.period_s");

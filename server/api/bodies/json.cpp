@@ -43,7 +43,8 @@ bool is_integer(const json& value) {
   return std::trunc(number) == number;
 }
 
-// Of an integer; none where it is beyond 64 bits, or is a number with a point beyond those that a double holds exactly.
+// The value of an integer; none where it is beyond 64 bits, or is a number with a point beyond those that a double
+// holds exactly.
 std::optional<std::int64_t> integer_of(const json& value) {
   constexpr double kMostExact = 9'007'199'254'740'992;
   if (value.is_number_float()) {
@@ -54,7 +55,8 @@ std::optional<std::int64_t> integer_of(const json& value) {
   return value.get<std::int64_t>();
 }
 
-// Of each object the name of a member that comes twice: nlohmann's parser keeps the last one and forgets the others.
+// Finds the name of a member that comes twice in an object: nlohmann's parser keeps the last one and forgets the
+// others.
 class RepeatedMembers {
  public:
   bool operator()(int, json::parse_event_t event, const json& parsed) {

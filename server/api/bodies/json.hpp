@@ -53,7 +53,7 @@ class Members {
   Result<std::uint64_t> id(const char* name) const;
   Result<void> time(const char* name, std::optional<std::int64_t>& into) const;  // left out: none
 
-  // Of a member that may be left out: none, or false, then.
+  // The value of a member that may be left out: none, or false, then.
   Result<std::optional<double>> optional_number(const char* name, Range<double> allowed) const;
   Result<bool> flag(const char* name) const;
 

@@ -36,7 +36,7 @@ inline constexpr double kLongestReservation_s = station::kLongestReservation / s
 inline constexpr Range<std::size_t> kNameBytes{1, 200}, kTextBytes{0, 4000}, kReasonBytes{1, 4000};
 inline constexpr Range<double> kReferenceSeconds{-1e10, 1e10}, kReferenceClockSd_s{0, 1000};
 
-// Of a text with an enum or a pattern in the document. Longer ones are refused by their length alone.
+// The length of a text with an enum or a pattern in the document. Longer ones are refused by their length alone.
 inline constexpr std::size_t kMaxWordBytes = 200;
 inline constexpr std::size_t kMaxLongWordBytes = 4000;
 
@@ -216,7 +216,7 @@ inline constexpr Limit<std::size_t> kListLimits[] = {
     {"SetDutyScheduleBody.schedule", {1, std::size(rheonaut_SetDutySchedule{}.duty)}},
 };
 
-// Of a property that the table does not have: an error of the compiler.
+// The range of a property; one that the table does not have is an error of the compiler.
 template <class Number, std::size_t size>
 consteval Range<Number> limit_in(const Limit<Number> (&table)[size], std::string_view property) {
   for (const Limit<Number>& limit : table) {

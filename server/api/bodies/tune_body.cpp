@@ -65,7 +65,7 @@ Result<void> read_specification(const Members& body, control::TuningSpec& spec) 
   return {};
 }
 
-// Of the robot that is to run the controller.
+// Reads the limits of the robot that is to run the controller.
 template <class Request>
 Result<void> read_robot(const Members& body, Request& request) {
   const auto duty_min = body.optional_number("duty_min", numbers("TuneJobBody.duty_min"));

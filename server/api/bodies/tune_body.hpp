@@ -11,7 +11,7 @@
 
 namespace server::api {
 
-// Which plant to tune for; one of the three.
+// The plant to tune for: one of the three.
 struct PlantOfJob {
   std::optional<storage::DesignId> model;  // a design
   std::string fluid;                       // its model in force

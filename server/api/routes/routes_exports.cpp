@@ -56,7 +56,7 @@ http::Answer export_csv(ExportRoutes parts, http::Request request) {
                        std::make_unique<CsvStream>(parts.history, std::move(parsed->spans), parsed->query));
 }
 
-// Of each sample.
+// The most rows that an export may have for each sample.
 std::uint64_t most_rows(const ParsedExport& parsed) {
   return 1 + kUsualPeriodUs / static_cast<std::uint64_t>(parsed.query.grid_us.value_or(kMaxGridUs));
 }

@@ -1,4 +1,4 @@
-// Whether the station is alive and ready, for whoever supervises it; without a token, so nothing secret is in it.
+// Whether the station is alive and ready, for a supervisor; without a token, so nothing secret is in it.
 #include "server/api/routes/routes.hpp"
 #include "server/net/transport_security.hpp"
 #include "server/storage/recording_parts.hpp"

@@ -68,7 +68,7 @@ json wait_for(const JobCommand& options, std::int64_t id) {
   }
 }
 
-// Of an ended job with its result; the result alone is what the tools read.
+// Writes an ended job with its result; the tools read the result alone.
 int write_ended(const JobCommand& options, const json& job, std::ostream& out) {
   const auto state = job.at("state").get<std::string>();
   const bool is_done = state == "done";

@@ -195,7 +195,7 @@ std::string model_words(const json& model) {
   return reason.empty() ? state : fmt::format("{}: {}", state, reason);
 }
 
-// Of the robot's document, or of what the station answers to a change: both have the two members.
+// Reads the robot's document, or the station's answer to a change: both have the two members.
 int print_fluid(const json& known, bool as_json, std::ostream& out) {
   const json& fluid = known.at("fluid");
   if (as_json) {

@@ -35,7 +35,7 @@ struct TimeLimit {
   bool is_option = false;  // the person can change it by --timeout-s
 };
 
-// Of the option --timeout-s.
+// The limit that the option --timeout-s sets.
 inline TimeLimit timeout(double seconds) {
   return {std::chrono::duration_cast<std::chrono::microseconds>(std::chrono::duration<double>{seconds}), true};
 }

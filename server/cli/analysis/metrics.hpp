@@ -23,7 +23,7 @@ struct MetricsQuestion {
 
 void add_options(CLI::App& command, MetricsQuestion& options);
 
-// Of one run, or of several side by side. Throws std::runtime_error saying what the station refused.
+// Prints the metrics of one run, or of several side by side. Throws std::runtime_error saying what the station refused.
 int run(const MetricsQuestion& options, std::ostream& out);
 
 }  // namespace server::cli

@@ -17,7 +17,7 @@
 
 namespace server::cli {
 
-// Of an emergency stop.
+// The outcome of an emergency stop.
 struct StopAnswer {
   bool is_confirmed = false;  // by the robot
   double confirmed_ms = 0;    // from the station's receipt of the request

@@ -51,7 +51,7 @@ void limit(Resource resource, rlim_t most) {
   ::setrlimit(resource, &both);
 }
 
-// Of the program itself; with a sanitizer these are terabytes.
+// The address space that the program itself has already taken; with a sanitizer that is terabytes.
 rlim_t address_space_bytes() {
   rlim_t pages = 0;
   std::ifstream{"/proc/self/statm"} >> pages;

@@ -212,7 +212,7 @@ void write_runs(std::ostream& out, const json& experiment) {
   table.write(out);
 }
 
-// Of an experiment that goes on until something is known: what each run performed, and what was known after it.
+// Writes what each run of an experiment with `until` performed, and what was known after it.
 void write_knowledge(std::ostream& out, const json& experiment) {
   const auto with = [](const json& run) { return !run.at("knowledge").is_null(); };
   const json& runs = experiment.at("runs");

@@ -33,7 +33,7 @@ std::string user_name(uid_t user) {
   return entry == nullptr ? fmt::format("user {}", user) : entry->pw_name;
 }
 
-// Whoever can read one of these can drive the robots, or pretend to be the station.
+// A person who can read one of these can drive the robots, or pretend to be the station.
 std::vector<fs::path> secrets_of(const config::Config& config) {
   std::vector<fs::path> files{config.data_dir / "rheonaut.token", config.database(),
                               config.data_dir / "tls/station.key", config.data_dir / "tls/lab-ca.key"};

@@ -19,7 +19,7 @@ namespace {
 using nlohmann::json;
 
 // SAFETY: longer than the station itself takes for its answer (1.5 s for robots, 3 s for the disk), so that the answer
-// is not missed; and an end, so that the person is told to use another switch while there is time.
+// is not missed; and an end, so that the person reads in time to use another switch.
 constexpr microseconds kStopPatience{7'000'000};
 
 constexpr microseconds kExplanationPatience{1'000'000};
@@ -173,7 +173,7 @@ void write_as_text(std::ostream& out, const std::vector<StopOutcome>& outcomes, 
   out.flush();
 }
 
-// Of those whose reason was not known yet.
+// Writes the reasons that were not known yet.
 void write_reasons(std::ostream& out, const std::vector<StopOutcome>& before, const std::vector<StopOutcome>& now) {
   for (std::size_t i = 0; i < now.size(); ++i) {
     if (now[i].is_confirmed || !before[i].why.empty()) continue;

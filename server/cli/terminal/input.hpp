@@ -1,4 +1,4 @@
-// Files that a command is given: whole, of bounded size and depth, whoever wrote them.
+// Files that a command is given: whole, of bounded size and depth, since anybody may have written them.
 #pragma once
 
 #include <cstddef>

@@ -190,7 +190,7 @@ asio::awaitable<void> Conduct::begin_recording(const Variant& variant, const Tim
   co_await parts_.writer.keep("a run of an experiment", std::move(add));
 }
 
-// Of the robot's fluid: the one that robots are sent, or the paper's.
+// The model of the robot's fluid: the one that robots are sent, or the paper's.
 Conduct::ModelInUse Conduct::model_in_use() const {
   const bool is_water = robot().fluid == "water";
   ModelInUse in_use{is_water ? control::kNewtonianModel : control::kNonNewtonianModel, is_water ? "(28)" : "(29)", {}};

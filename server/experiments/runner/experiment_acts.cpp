@@ -239,7 +239,7 @@ Experiments::Entry* Experiments::entry_of(ExperimentId id) {
   return found == entries_.end() ? nullptr : &found->second;
 }
 
-// Of one without an entry.
+// Refuses an act on an experiment without an entry.
 asio::awaitable<Result<ExperimentView>> Experiments::refuse(ExperimentId id, const char* what) {
   const auto view = co_await find(id);
   if (!view) co_return std::unexpected{view.error()};

@@ -13,7 +13,7 @@ namespace {
 
 constexpr microseconds kAgainAfter = std::chrono::seconds{1};
 
-// Of a disk that is full, slow, busy or away; anything else would fail for ever.
+// Whether the error is of a disk that is full, slow, busy or away; any other would come for ever.
 bool may_pass(const SQLite::Exception& error) {
   switch (error.getErrorCode()) {
     case SQLITE_BUSY:

@@ -32,7 +32,7 @@ struct Unsubscribe {
 };
 using ClientMessage = std::variant<Subscribe, Unsubscribe>;
 
-// Of a text message. The error is a sentence that says what is wrong and which value.
+// Reads a text message. The error is a sentence that says what is wrong and which value.
 std::expected<ClientMessage, std::string> parse_client_message(const std::string& text);
 
 // Why a binary message is not acted on: all of them would change something.

@@ -27,7 +27,7 @@ std::string utc_text(std::int64_t utc_us);
 
 class Reservations {
  public:
-  // Whose an actor is. Without it: a user's page is the user's, everybody else is an account of their own.
+  // Finds the account of an actor. Without it, a user's page is the user's, everybody else is an account of their own.
   using AccountOf = std::function<std::string(const std::string& actor)>;
   void set_account_of(AccountOf account_of) { account_of_ = std::move(account_of); }
   std::string account_of(const std::string& actor) const;
@@ -40,7 +40,7 @@ class Reservations {
   void forget_over(std::int64_t utc_us);
 
   const Reservation* find(ReservationId id) const;                              // null: over, or none
-  const Reservation* running(const RobotId& robot, std::int64_t utc_us) const;  // whoever holds it; null: none
+  const Reservation* running(const RobotId& robot, std::int64_t utc_us) const;  // of any holder; null: none
   // The first one that keeps the actor out at a moment of [from_us, until_us); null: none. SAFETY: the station itself
   // is never kept out, so that it can bring a robot to rest.
   const Reservation* keeps_out(const RobotId& robot, const std::string& actor, std::int64_t from_us,

@@ -14,7 +14,7 @@
 
 namespace server::station {
 
-// Of what stopped the robot, or may move it again, and what it can no longer do.
+// Whether the event is about a stop of the robot, its moving again, or a loss of something that it could do.
 constexpr bool is_of_safety(protocol::EventKind kind) {
   switch (kind) {
     case rheonaut_EVENT_KIND_BOOT:

@@ -99,9 +99,10 @@ SQLite::Database open_checked(const std::filesystem::path& path) {
   }
 }
 
-// What a kill has left in the write-ahead log can be read, but the disk may not hold it yet, and robots will be told
-// that it is durable. And a log that goes on where a power cut has left it goes on inside a sector that holds a commit.
-// So it begins anew, after a checkpoint, which first syncs it (so when there is no room for the rest, that is done).
+// What a kill has left in the write-ahead log can be read, but the disk may not hold it yet, and robots will get
+// it acknowledged as durable. And a log that goes on where a power cut has left it goes on inside a sector that holds a
+// commit. So it begins anew, after a checkpoint, which first syncs it (so when there is no room for the rest, that is
+// done).
 void settle(SQLite::Database& database) {
   const int result =
       sqlite3_wal_checkpoint_v2(database.getHandle(), nullptr, SQLITE_CHECKPOINT_TRUNCATE, nullptr, nullptr);

@@ -73,7 +73,7 @@ asio::awaitable<void> Jobs::run_each() {
   }
 }
 
-// The wait for the thread of the jobs cannot be cancelled, so the job is told to end.
+// The wait for the thread of the jobs cannot be cancelled, so the job is ended first.
 asio::awaitable<void> Jobs::cancel_at_the_end() {
   struct Cancel {
     Jobs& jobs;

@@ -18,7 +18,7 @@ class HttpServerTest : public ApiTest {
     return client.read_to_end();
   }
   std::string get(const std::string& target) { return talk(head("GET " + target, "Connection: close\r\n")); }
-  // What the page does when the button of a link is pressed.
+  // Redeems a login link as its page does when the button is pressed.
   std::string redeem(const std::string& url, const std::string& extra = "") {
     const std::string body = json{{"code", url.substr(url.find("code=") + 5)}}.dump();
     return talk("POST /api/v1/login HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n" + extra +

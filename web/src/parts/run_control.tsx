@@ -103,7 +103,7 @@ function RunForm({ session, robot, name, disabled, on_start, on_fluid }: RunForm
     picked.value = next;
     if (listed) void on_fluid(next).then((taken) => taken || (picked.value = null));
   };
-  // Whoever named another one since: the robot is in that.
+  // Another fluid may have been named since: the robot is in that.
   useEffect(() => void (picked.value = null), [known]);
   return (
     <form

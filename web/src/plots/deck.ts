@@ -54,7 +54,7 @@ export class Deck {
     this.charts.push(new StripChart(host, options, this.window, is_last, painters, () => this.mark_dirty()));
   }
 
-  // Of the strip with that number.
+  // Whether the strip with that number cuts its band off.
   cuts_band(at: number): boolean {
     return this.charts[at]?.cuts_band ?? false;
   }

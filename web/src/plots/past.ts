@@ -59,7 +59,7 @@ export class Past {
   private is_closed = false;
   private derived: readonly DerivedSpec[] = [];
 
-  // `least_level`: 1 where whoever asks has the samples themselves from elsewhere.
+  // `least_level`: 1 where the caller has the samples themselves from elsewhere.
   constructor(
     private readonly ways: PastWays,
     private readonly on_change: () => void,

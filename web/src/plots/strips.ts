@@ -231,7 +231,7 @@ export function look_of(column: AnyColumn): Pick<Strip, 'unit' | 'value' | 'labe
 
 const kPerSecond: Record<string, string> = { 'mm/s': 'mm/s²', 'mm/s²': 'mm/s³' };
 
-// Of a derived one: in its own unit.
+// The look of a derived trace, in its own unit.
 export function look_of_derived(spec: DerivedSpec): Pick<Strip, 'unit' | 'value' | 'label' | 'least_span'> {
   const { unit, value, label, least_span = 1 } = look_of(spec.of);
   if (spec.kind !== 'derivative') return { unit, value, label, least_span: least_span / 4 };

@@ -1,6 +1,6 @@
 // What stretch of time the plots show, past and present on one axis: running with the newest sample, or held still.
 //
-// Times are UTC in seconds. Whoever draws hands in `now_s`, the right edge of a plot that runs.
+// Times are UTC in seconds. The caller that draws hands in `now_s`, the right edge of a plot that runs.
 
 export const kLeastSpan_s = 0.2;
 export const kLongestSpan_s = 40 * 86_400;
@@ -34,7 +34,7 @@ export class TimeAxis {
     return { from: ms(this.held_to_s - this.span_s), to: ms(this.held_to_s) };
   }
 
-  // Past the newest sample there is nothing: whoever drags there runs along with it again.
+  // Past the newest sample there is nothing: dragging there runs along with it again.
   pan(by_s: number, now_s: number): void {
     const to_s = this.view(now_s).to_s + by_s;
     this.held_to_s = to_s >= now_s ? null : to_s;

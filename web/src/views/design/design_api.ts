@@ -196,7 +196,7 @@ export class DesignApi implements JobsApi {
   }
 }
 
-// Of a controller that is kept: what it says to the robot, where its document has coefficients.
+// The coefficients of a kept controller, as the robot runs it; null where its document has none.
 export function discretised_of(document: unknown): Discretised | null {
   const found = (document as { discretised?: Discretised | null } | null)?.discretised;
   return found?.sections ? found : null;

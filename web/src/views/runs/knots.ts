@@ -127,7 +127,7 @@ export class Knots {
     return after !== undefined && after.utc_us - at_us <= within_us;
   }
 
-  // Of the first knot later than a moment.
+  // The index of the first knot later than a moment.
   private index_after(utc_us: number): number {
     let [low, high] = [0, this.list.length];
     while (low < high) {

@@ -95,7 +95,7 @@ export function interrupted_stretches(run: Run, origin_us: number, knots: Knots)
   });
 }
 
-// Of the record: how often and how long it waited; empty: it did not.
+// How often and how long the run was interrupted; empty: it was not.
 export function interruptions_text({ interrupted }: Pick<Run, 'interrupted'>): string {
   if (interrupted.length === 0) return '';
   const all_s = interrupted.reduce((sum, part) => sum + waited_s(part), 0);

@@ -94,7 +94,7 @@ function Completeness({ run, certificate }: { run: Run; certificate: Certificate
   );
 }
 
-// Of a run whose robot does not come back, for admins.
+// Ends the wait for a robot that does not come back, for admins.
 export function GiveUp({ api, page, run }: { api: RunsApi; page: RunPage; run: Run }) {
   const asking = useAsking('station');
   const certificate = page.certificate.value;

@@ -35,7 +35,7 @@ export class RunPage {
     void this.traces.value; // knots came with them
     return run ? interrupted_stretches(run, this.origin_us, this.knots) : [];
   });
-  // Of the whole run: where samples are missing, since its first one.
+  // The stretches of the whole run where samples are missing, since its first one.
   readonly gaps_s = computed(() => {
     const whole = this.whole.value;
     return whole ? traces_of(whole, this.origin_us, new Knots(period_us_of(whole))).gaps_s : [];

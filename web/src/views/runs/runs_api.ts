@@ -114,7 +114,7 @@ export class RunsApi {
   first_after = async (run_id: number, after: string): Promise<StoredSample | null> =>
     (await this.api.read<{ samples: StoredSample[] }>(`/runs/${run_id}/samples?${query({ after, limit: 1 })}`))
       .samples[0] ?? null;
-  // Of one run, or of several together.
+  // The impedance map of one run, or of several together.
   impedance = async (runs: number[], bin_mm: number): Promise<ImpedanceMap> => {
     if (runs.length === 1) return this.api.read<ImpedanceMap>(`/runs/${runs[0]}/impedance-map?${query({ bin_mm })}`);
     const path = `/run-comparison/impedance-map?${query({ runs: runs.join(','), bin_mm })}`;

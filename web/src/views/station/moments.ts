@@ -33,7 +33,7 @@ export const backup_name = (now_ms: number) =>
     .replace(' ', '-')
     .replaceAll(':', '') + 'Z';
 
-// Of a moment that has been: "now", "3 min ago".
+// The age of a past moment: "just now", "3 min ago".
 export const ago_text = (at_us: number, now_ms: number) => {
   const age_s = (now_ms - at_us / 1000) / 1000;
   return age_s < 60 ? 'just now' : `${span_text(age_s)} ago`;

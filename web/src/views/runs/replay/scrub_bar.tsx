@@ -66,7 +66,7 @@ export function ScrubBar({ replay, whole, gaps_s }: { replay: Replay; whole: Ove
 
 const kWeight: Record<Mark['tone'], number> = { event: 0, command: 1, marker: 2, gap: 3, alarm: 4 };
 
-// Of those that would lie on each other the most important.
+// The marks to draw: of those that would lie on each other the most important.
 export function thinned(marks: readonly Mark[], length_s: number): Mark[] {
   const slots = new Map<number, Mark>();
   for (const mark of marks) {
