@@ -169,7 +169,7 @@ std::optional<AmplitudeEvidence> amplitude_evidence(OutputErrorSearch& search, c
 }
 
 std::vector<std::string> amplitude_doubts(const std::optional<AmplitudeEvidence>& evidence, const Recording& recording,
-                                          bool order_is_forced) {
+                                          bool order_is_forced, const std::string& structure_option) {
   if (!evidence || !(evidence->f > kDoubtfulF && evidence->share >= kDoubtfulShare)) return {};
   double largest = 0;
   for (const double duty : recording.duty) largest = std::max(largest, std::abs(duty));
@@ -180,8 +180,9 @@ std::vector<std::string> amplitude_doubts(const std::optional<AmplitudeEvidence>
        << "ones that follow duty and speed explain " << 100 * evidence->share
        << " % of what the model leaves (F = " << evidence->f << ", above " << kDoubtfulF << "): ";
   if (order_is_forced) {
-    text << "the likelier reason is that its order was forced and is too low; identify without --structure, and see "
-            "whether this doubt remains";
+    text << "the likelier reason is that its order was forced and is too low; identify without "
+         << (structure_option.empty() ? "a structure that is given" : structure_option)
+         << ", and see whether this doubt remains";
   } else {
     text << "no linear model holds from rest to duty " << largest
          << "; fit runs of one amplitude each, and use a fit near its amplitude only";

@@ -27,8 +27,8 @@ namespace control {
 std::optional<AmplitudeEvidence> amplitude_evidence(OutputErrorSearch& search, const Recording& recording,
                                                     const Fit& fit, const SearchPoint& point);
 
-// order_is_forced: the structure was given, and it is not the fractional one.
+// order_is_forced: the structure was given, and it is not the fractional one; structure_option: how, or empty.
 std::vector<std::string> amplitude_doubts(const std::optional<AmplitudeEvidence>& evidence, const Recording& recording,
-                                          bool order_is_forced);
+                                          bool order_is_forced, const std::string& structure_option = {});
 
 }  // namespace control

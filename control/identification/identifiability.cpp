@@ -221,8 +221,8 @@ std::vector<std::string> search_doubts(const Fit& fit, const IdentificationOptio
   if (fit.starts > 1 && fit.starts_that_agree < 2) {
     warnings.push_back(
         base::join_text("only ", fit.starts_that_agree, " of ", fit.starts,
-                        " starts reached the best cost: it may be a local minimum; raise further_starts or "
-                        "the iteration limit"));
+                        " starts reached the best cost: it may be a local minimum; identify another run of the same "
+                        "fluid, and compare"));
   }
   return warnings;
 }

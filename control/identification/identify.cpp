@@ -56,7 +56,7 @@ Identification identify(const Recording& recording, const IdentificationOptions&
   add(untried_structures(result.compared));
   add(second_opinions(search, recording, options, result.best));
   const bool order_is_forced = options.structure && *options.structure != Structure::fractional;
-  add(amplitude_doubts(result.amplitude, recording, order_is_forced));
+  add(amplitude_doubts(result.amplitude, recording, order_is_forced, options.names.structure));
   add(residual_doubts(search, recording, options, result.best));
   add(identifiability_warnings(recording, result.best, options));
   add_verdict(result.compared, 1, warnings);

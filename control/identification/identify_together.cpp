@@ -53,7 +53,7 @@ std::vector<std::string> doubts_of(JointSearch& search, std::size_t i, const Rec
   append(warnings, lag_doubts(recording, options, fit));
   append(warnings, second_opinions(search.of_run(i), recording, options, fit));
   const bool order_is_forced = options.structure && *options.structure != Structure::fractional;
-  append(warnings, amplitude_doubts(amplitude, recording, order_is_forced));
+  append(warnings, amplitude_doubts(amplitude, recording, order_is_forced, options.names.structure));
   append(warnings, residual_doubts(search.of_run(i), recording, options, fit));
   return warnings;
 }

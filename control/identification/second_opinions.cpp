@@ -27,6 +27,8 @@ constexpr double kNoticeableLagS = 0.002;                 // twice what the age 
 constexpr double kMotionSigmas = 5, kMotionShare = 0.01;  // of v0, and of the squares that it explains
 constexpr double kNoticeableRows = 0.3;                   // of a duty that is shifted, to first order
 
+std::string in_brackets(const std::string& option) { return option.empty() ? option : " (" + option + ")"; }
+
 double lowest_percent(const OutputErrorSearch& search, const Recording& recording, const Fit& fit) {
   return std::min({fit_percent(search, fit.position_residual_m, recording.position_m, recording.position_sd_m),
                    fit_percent(search, fit.velocity_residual_m_s, recording.velocity_m_s),
@@ -80,7 +82,8 @@ void add_missing_offset(const OutputErrorSearch& search, const Recording& record
   text.precision(3);
   text << "position_m begins at " << with_offset->offset_m
        << " m, and this offset is not fitted: the parameters make up for it; fitting it lowers the residual sd from "
-       << fit.residual_sd << " to " << with_offset->residual_sd << " m, so fit the offset too (fits_offset)";
+       << fit.residual_sd << " to " << with_offset->residual_sd << " m, so fit the offset too"
+       << in_brackets(options.names.offset);
   warnings.push_back(text.str());
 }
 
@@ -264,7 +267,8 @@ void add_shifted_duty(OutputErrorSearch& search, const Recording& recording, con
        << ", kp, b1, b2, alpha, beta = " << shifted->model.kp << ", " << shifted->model.b1 << ", " << shifted->model.b2
        << ", " << shifted->model.alpha << ", " << shifted->model.beta
        << "): the duty of a row must be what the motor has from that row on to the next; "
-       << (rows > 0 ? "move the column down by a row, or search for a dead time (--dead-time-s), if there is one"
+       << (rows > 0 ? "move the column down by a row, or search for a dead time" +
+                          in_brackets(options.names.dead_time) + ", if there is one"
                     : "move the column up by a row");
   warnings.push_back(text.str());
 }
@@ -286,17 +290,18 @@ std::vector<std::string> lag_doubts(const Recording& recording, const Identifica
     return {
         base::join_text("the sensor's readings came out ", 1e3 * sensor.delay_s,
                         " ms late, the most that is searched for without a dead time: the other parameters make up for "
-                        "what it lacks; search for a dead time (--dead-time-s)")};
+                        "what it lacks; search for a dead time",
+                        in_brackets(options.names.dead_time))};
   }
   // How old samples in step with the ticks are is not known: up to a period.
   const double late_s = sensor.delay_s - options.sensor_lag_s.value_or(0), half_period_s = recording.dt_s / 2;
   const double at_least_s = late_s - (sensor.has_own_clock ? half_period_s : 2 * half_period_s);
   const double at_most_s = late_s - (sensor.has_own_clock ? half_period_s : 0);
   if (options.sensor_lag_s && at_most_s < -kNoticeableLagS) {
-    return {base::join_text("the sensor's readings come ", 1e3 * (at_most_s + *options.sensor_lag_s),
-                            " ms late at most, less than the sensor's own lag that was given, ",
-                            1e3 * *options.sensor_lag_s,
-                            " ms, which hides any dead time: give the lag that it has, in seconds (--sensor-lag-s)")};
+    return {base::join_text(
+        "the sensor's readings come ", 1e3 * (at_most_s + *options.sensor_lag_s),
+        " ms late at most, less than the sensor's own lag that was given, ", 1e3 * *options.sensor_lag_s,
+        " ms, which hides any dead time: give the lag that it has, in seconds", in_brackets(options.names.sensor_lag))};
   }
   if (!(at_least_s > kNoticeableLagS)) return {};
   std::ostringstream text;
@@ -304,14 +309,15 @@ std::vector<std::string> lag_doubts(const Recording& recording, const Identifica
   if (!options.sensor_lag_s) {
     text << "a dead time of up to " << 1e3 * at_most_s << " ms cannot be told from the age of the sensor's readings: "
          << (finds_dead_time ? 1e3 * fit.model.dead_time_s : 1e3 * at_most_s) << " ms were attributed to the "
-         << (finds_dead_time ? "plant; give the sensor's own lag (--sensor-lag-s), if it is known"
-                             : "readings, none to the plant; if the sensor is not so late, search for the dead time "
-                               "(--dead-time-s)");
+         << (finds_dead_time
+                 ? "plant; give the sensor's own lag" + in_brackets(options.names.sensor_lag) + ", if it is known"
+                 : "readings, none to the plant; if the sensor is not so late, search for the dead time" +
+                       in_brackets(options.names.dead_time));
     return {text.str()};
   }
   if (finds_dead_time) return {};
   text << "the readings come up to " << 1e3 * at_most_s << " ms later than the sensor's own lag explains: that is a "
-       << "dead time, and the model has none; search for it (--dead-time-s)";
+       << "dead time, and the model has none; search for it" << in_brackets(options.names.dead_time);
   return {text.str()};
 }
 

@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <functional>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "control/models/plant_models.hpp"
@@ -48,6 +49,12 @@ struct Progress {
   double sse = 0;
 };
 
+// What the reader of a warning calls an option, for the advice in it: "--dead-time-s". Empty: the reader cannot give
+// it, and no advice names it.
+struct OptionNames {
+  std::string dead_time, sensor_lag, offset, structure;
+};
+
 struct IdentificationOptions {
   std::optional<Structure> structure;  // none: all three, best by AIC
   Cost cost = Cost::least_squares;
@@ -64,6 +71,8 @@ struct IdentificationOptions {
   // Of an accelerometer's readings, beyond their sampling and their low pass. What comes later than that is the plant's
   // dead time; the record alone cannot separate the two.
   std::optional<double> sensor_lag_s;
+
+  OptionNames names;
 };
 
 inline constexpr std::size_t kParameters = 5;  // ln-scaled inside; reported as kp, b1, b2, alpha, beta

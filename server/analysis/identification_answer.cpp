@@ -29,11 +29,13 @@ void add_outside_doubts(const RunRecording& recorded, const control::Identificat
   }
   // A dead time of the plant and a camera's clock that is ahead look the same: positions come late after the duty.
   const double clock_sigma_s = best.position_clock_sigma_s.value_or(0);
+  const std::string& name = options.names.dead_time;
+  const std::string option = name.empty() ? name : fmt::format(" ({})", name);
   if (std::abs(best.position_clock_s) > std::max(kSuspiciousClockS, 3 * clock_sigma_s)) {
     warnings.push_back(fmt::format(
         "the outside position's clock came out {:.0f} ms off: {}", 1e3 * best.position_clock_s,
         best.position_clock_s < 0
-            ? "if it is not, that is a dead time of the plant; search with --dead-time-s"
+            ? "if it is not, that is a dead time of the plant; search for it" + option
             : "the positions come before the duty that moves the robot, as no plant does; correct the clock's offset"));
   }
   if (options.longest_dead_time_s > 0) {

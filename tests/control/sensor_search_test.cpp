@@ -105,6 +105,15 @@ TEST(SensorSearch, ADeadTimeBeyondWhatTheReadingsMayHideIsNamedAndFound) {
   EXPECT_FALSE(found.best.sensor->delay_is_at_limit);
 }
 
+TEST(SensorSearch, NamesAnOptionOnlyToThoseWhoHaveIt) {
+  const Recording run = acceleration_run(6, 0.002, 0, 0, 0.03);
+  IdentificationOptions options = one_start();
+  EXPECT_THAT(identify(run, options).warnings,
+              Contains(AllOf(HasSubstr("search for the dead time"), Not(HasSubstr("(")))));
+  options.names = {"--dead-time-s", "--sensor-lag-s", "--offset", "--structure"};
+  EXPECT_THAT(identify(run, options).warnings, Contains(HasSubstr("search for the dead time (--dead-time-s)")));
+}
+
 TEST(SensorSearch, DoubtsALagOfTheSensorThatTheReadingsDoNotHave) {
   const auto is_said = Contains(HasSubstr("less than the sensor's own lag that was given"));
   for (const double sensor_lag_s : {0.06, 2.0}) {

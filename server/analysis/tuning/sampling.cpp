@@ -18,7 +18,7 @@ control::DiscretisationChoice discretised(const control::FopdController& control
   options.a = sampling.a.value_or(options.a);
   options.loop_bandwidth_rad_s = sampling.bandwidth_rad_s;
   if (sampling.a && options.method != control::DiscretisationMethod::direct) {
-    throw std::invalid_argument{fmt::format("--a {} belongs to --method direct; drop one of them", *sampling.a)};
+    throw std::invalid_argument{fmt::format("a = {} belongs to the method direct; drop one of them", *sampling.a)};
   }
   const control::Discretisation made = control::discretise(controller, options);
   return {made, "as asked for", {made}, {}};

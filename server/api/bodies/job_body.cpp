@@ -66,6 +66,12 @@ Result<void> read_window(const Members& body, const WindowNames& names, analysis
       "out_of_range");
 }
 
+// How whoever reads a warning can give what it advises, wherever it is read: on the page, or of autotune, which asks
+// for a job without these.
+const control::OptionNames kAdvice{"rheonaut identify --dead-time-s; dead_time_s of a job",
+                                   "rheonaut identify --sensor-lag-s; sensor_lag_s of a job",
+                                   "rheonaut identify --offset; fits_offset of a job", "a structure that is given"};
+
 Result<void> read_search(const Members& body, control::IdentificationOptions& search) {
   using control::Cost;
   using control::Structure;
@@ -89,6 +95,7 @@ Result<void> read_search(const Members& body, control::IdentificationOptions& se
   const auto lag_s = body.optional_number("sensor_lag_s", numbers("IdentifyJobBody.sensor_lag_s"));
   if (!lag_s) return std::unexpected{lag_s.error()};
   search.sensor_lag_s = *lag_s;
+  search.names = kAdvice;
   return {};
 }
 

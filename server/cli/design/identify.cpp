@@ -151,6 +151,7 @@ std::vector<analysis::RunOfMany> recordings_for(const Identify& options) {
 
 control::Identification search(const Identify& options, std::span<const analysis::RunOfMany> runs) {
   control::IdentificationOptions settings = options.search;
+  settings.names = {"--dead-time-s", "--sensor-lag-s", "--offset", "--structure"};
   Progress shown{"identify", options.form};
   settings.on_progress = [&shown](const control::Progress& progress) {
     shown.set_detail(fmt::format("{}, start {} of {}, iteration {}, sse {:.6g}", text(progress.structure),
