@@ -35,8 +35,10 @@ void add_uncertainty(OutputErrorSearch& search, const SearchPoint& point, const 
   const std::vector<int> free = search.free_parameters(fit.structure);
   std::vector<Eigen::MatrixXd> jacobians = search.jacobians(fit.structure, point);
   const double channels = static_cast<double>(jacobians.size());
-  Eigen::MatrixXd stacked(jacobians.front().rows() * static_cast<Index>(jacobians.size()),
+  const Eigen::MatrixXd of_prior = search.prior_slopes(fit.structure, point);
+  Eigen::MatrixXd stacked(jacobians.front().rows() * static_cast<Index>(jacobians.size()) + of_prior.rows(),
                           static_cast<Index>(free.size()));
+  stacked.bottomRows(of_prior.rows()) = of_prior;
   for (std::size_t c = 0; c < jacobians.size(); ++c) {
     const Index samples = jacobians[c].rows();
     const SensorPath* path = search.sensor();

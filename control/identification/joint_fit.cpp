@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <sstream>
+#include <utility>
 
 #include "control/identification/fit_summary.hpp"
 #include "control/search/fit_statistics.hpp"
@@ -24,6 +25,16 @@ struct Block {
   Eigen::VectorXd residual;
   double values = 0;  // that count
 };
+
+// Of what is known of the sensors beside the readings.
+std::vector<Block> priors(JointSearch& search, Structure structure, const JointResult& found) {
+  std::vector<Block> all;
+  for (std::size_t i = 0; i < search.runs(); ++i) {
+    const OutputErrorSearch& of_run = search.of_run(i);
+    all.push_back({i, of_run.prior_slopes(structure, found.points[i]), {}, 0});
+  }
+  return all;
+}
 
 std::vector<Block> blocks(JointSearch& search, Cost cost, Structure structure, const JointResult& found) {
   const JointColumns columns = search.columns(structure);
@@ -94,7 +105,9 @@ std::optional<double> sigma_of_mean(const std::vector<Fit>& runs) {
 void add_uncertainty(JointSearch& search, Cost cost, const JointResult& found, JointFit& fit) {
   const Structure structure = fit.all.structure;
   const JointColumns columns = search.columns(structure);
-  const Uncertainty sigmas = uncertainty(stacked(blocks(search, cost, structure, found), columns));
+  std::vector<Block> all = blocks(search, cost, structure, found);
+  for (Block& block : priors(search, structure, found)) all.push_back(std::move(block));
+  const Uncertainty sigmas = uncertainty(stacked(all, columns));
   for (std::size_t i = 0; i < search.runs(); ++i) {
     take_sigmas(sigmas, search.of_run(i).free_parameters(structure), columns.of_run[i], fit.runs[i]);
   }

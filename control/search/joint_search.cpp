@@ -17,6 +17,7 @@ constexpr double kRoundingShare = 1e-9;  // residuals below this share of the si
 constexpr int kWeightRounds = 3;
 constexpr int kReweightings = 200;  // of the absolute error
 constexpr int kIterationsPerReweighting = 3;
+constexpr double kMeanSize = 0.8;  // of normal noise, in sds
 
 bool is_common(int parameter) { return parameter < static_cast<int>(kParameters) || parameter == kDeadTime; }
 
@@ -46,6 +47,7 @@ void JointSearch::find_sensors(int structures) {
 }
 
 void JointSearch::reset_weights() {
+  is_of_absolute_error_ = false;
   weights_.assign(runs(), {});
   for (std::size_t i = 0; i < runs(); ++i) {
     const SearchPoint any = searches_[i]->start(Structure::first_order, 0);
@@ -161,6 +163,9 @@ bool JointSearch::residuals_at(Structure structure, const Eigen::VectorXd& x, Ei
       residual.segment(row, parts[c].size()) = parts[c].cwiseProduct(weights_[i][c].root_weight) / weights_[i][c].sd;
       row += parts[c].size();
     }
+    const Eigen::VectorXd of_prior = prior_weight(i) * searches_[i]->prior_residuals(structure, points[i]);
+    residual.segment(row, of_prior.size()) = of_prior;
+    row += of_prior.size();
   }
   return true;
 }
@@ -182,18 +187,31 @@ bool JointSearch::slopes_at(Structure structure, const Eigen::VectorXd& x, Eigen
       }
       row += parts[c].rows();
     }
+    const Eigen::MatrixXd of_prior = prior_weight(i) * searches_[i]->prior_slopes(structure, points[i]);
+    for (Index j = 0; j < of_prior.cols(); ++j) {
+      slopes.col(where.of_run[i][static_cast<std::size_t>(j)]).segment(row, of_prior.rows()) =
+          chain[j] * of_prior.col(j);
+    }
+    row += of_prior.rows();
   }
   return true;
+}
+
+// The root of what the prior of a run's sensor weighs, by the sum that is minimised.
+double JointSearch::prior_weight(std::size_t run) const {
+  const double noise = searches_[run]->reading_sd_m_s2() / weights_[run].front().sd;
+  return is_of_absolute_error_ ? std::sqrt(kMeanSize * noise) : noise;
 }
 
 double JointSearch::sse_of(const Eigen::VectorXd& residual) const {
   double sum = 0;
   Index row = 0;
-  for (const auto& of_run : weights_) {
-    for (const Weight& weight : of_run) {
+  for (std::size_t i = 0; i < runs(); ++i) {
+    for (const Weight& weight : weights_[i]) {
       sum += weight.sd * weight.sd * residual.segment(row, weight.root_weight.size()).squaredNorm();
       row += weight.root_weight.size();
     }
+    row += prior_values_[i];
   }
   return sum;
 }
@@ -203,6 +221,11 @@ SearchEnd JointSearch::descend(Structure structure, Points& points, int iteratio
   SquaresToMinimise squares;
   for (const auto& of_run : weights_) {
     for (const Weight& weight : of_run) squares.values += weight.root_weight.size();
+  }
+  prior_values_.clear();
+  for (std::size_t i = 0; i < runs(); ++i) {
+    prior_values_.push_back(searches_[i]->prior_residuals(structure, points[i]).size());
+    squares.values += prior_values_.back();
   }
   squares.residuals = [&](const Eigen::VectorXd& x, Eigen::VectorXd& residual) {
     return residuals_at(structure, x, residual);
@@ -280,18 +303,21 @@ void JointSearch::refine_weights(Structure structure, JointResult& result) {
   }
 }
 
-double JointSearch::absolute_cost(const Points& points) {
+double JointSearch::absolute_cost(Structure structure, const Points& points) {
   double sum = 0;
   for (std::size_t i = 0; i < runs(); ++i) {
     const auto parts = searches_[i]->residuals(points[i]);
     for (std::size_t c = 0; c < parts.size(); ++c) sum += (parts[c] / weights_[i][c].sd).lpNorm<1>();
+    const double weight = prior_weight(i);
+    sum += weight * weight / 2 * searches_[i]->prior_residuals(structure, points[i]).squaredNorm();
   }
   return sum;
 }
 
 // Weights 1/|r| make the squares of (1) the absolute values of (2); each round must lower (2), or is the last.
 void JointSearch::refine_absolute_error(Structure structure, JointResult& result) {
-  double lowest = absolute_cost(result.points);
+  is_of_absolute_error_ = true;
+  double lowest = absolute_cost(structure, result.points);
   result.end = SearchEnd::iteration_limit;
   Points points = result.points;
   int small_gains = 0;
@@ -309,7 +335,7 @@ void JointSearch::refine_absolute_error(Structure structure, JointResult& result
     result.iterations = last_iterations_;
     if (end == SearchEnd::not_finite) result.end = end;
     if (limit_.end() || end == SearchEnd::not_finite) return;
-    const double found = absolute_cost(points);
+    const double found = absolute_cost(structure, points);
     small_gains = found > lowest * (1 - 1e-8) ? small_gains + 1 : 0;
     if (found < lowest) lowest = found, result.points = points;
     if (small_gains == 3) {

@@ -66,7 +66,8 @@ class JointSearch {
   void refine_absolute_error(Structure structure, JointResult& result);
   SearchEnd descend(Structure structure, Points& points, int iteration_limit, Progress progress,
                     const KnownMinimum* known = nullptr);
-  double absolute_cost(const Points& points);  // (2)
+  double absolute_cost(Structure structure, const Points& points);  // (2)
+  double prior_weight(std::size_t run) const;
   Eigen::VectorXd coordinates(Structure structure, const Points& points) const;
   Points points_at(Structure structure, const Eigen::VectorXd& x) const;
   bool residuals_at(Structure structure, const Eigen::VectorXd& x, Eigen::VectorXd& residual);
@@ -77,6 +78,8 @@ class JointSearch {
   SearchLimit limit_;
   std::vector<std::unique_ptr<OutputErrorSearch>> searches_;
   std::vector<std::vector<Weight>> weights_;  // by run and channel
+  std::vector<Eigen::Index> prior_values_;    // by run, of the descent that goes on
+  bool is_of_absolute_error_ = false;
   std::size_t longest_ = 0;
   int last_iterations_ = 0;
   double last_cost_ = 0;

@@ -14,22 +14,11 @@ namespace {
 
 using Eigen::Index;
 
-constexpr double kNearestToBound = 1e-9;  // of the orders and the dead time, as a share of their interval
-constexpr double kLargestLog = 60;        // of the gain and the coefficients, against their start in the search
-constexpr double kRoundingShare = 1e-9;   // residuals below this share of the signal are equal
-constexpr int kWeightRounds = 3;          // of two channels
-constexpr int kReweightings = 200;        // of the absolute error
+constexpr double kRoundingShare = 1e-9;  // residuals below this share of the signal are equal
+constexpr int kWeightRounds = 3;         // of two channels
+constexpr int kReweightings = 200;       // of the absolute error
 constexpr int kIterationsPerReweighting = 3;
-
-double logit(double share) { return std::log(share / (1 - share)); }
-
-double logistic(double x) { return std::clamp(1 / (1 + std::exp(-x)), kNearestToBound, 1 - kNearestToBound); }
-
-double inside(double share) { return std::clamp(share, kNearestToBound, 1 - kNearestToBound); }
-
-constexpr double kEarliestSample = 4, kLatestSample = 2;   // A of sensor_path.hpp in ticks, before and after the tick
-constexpr double kLongestTimeConstant = 1;                 // of the sensor, in ticks: more is the fluid
-constexpr double kClockScaleS = 0.01, kLargestClock = 50;  // of a position's clock: half a second at most
+constexpr double kMeanSize = 0.8;  // of normal noise, in sds
 
 Eigen::VectorXd ones_but_at(const std::vector<bool>& uncounted) {
   Eigen::VectorXd ones = Eigen::VectorXd::Ones(std::ssize(uncounted));
@@ -149,8 +138,6 @@ std::vector<Eigen::MatrixXd> OutputErrorSearch::jacobians(Structure structure, c
   return result;
 }
 
-double OutputErrorSearch::earliest_sample_s() const { return -options_.longest_dead_time_s - kEarliestSample * dt_s_; }
-
 Eigen::VectorXd OutputErrorSearch::seen(const Measured& measured, const SearchPoint& point,
                                         const Eigen::VectorXd& output) const {
   if (measured.times) return measured.times->weighed(measured.times->read(output, point.position_clock_s));
@@ -175,58 +162,6 @@ Eigen::VectorXd OutputErrorSearch::counted(const Eigen::VectorXd& residual) cons
   return kept;
 }
 
-Eigen::VectorXd OutputErrorSearch::coordinates(Structure structure, const SearchPoint& point) const {
-  const double dead_time_share = inside(point.model.dead_time_s / options_.longest_dead_time_s);
-  const FractionalModel& m = point.model;
-  const SensorTiming& sensor = point.sensor;
-  const double earliest_s = earliest_sample_s(), sensor_span_s = kLatestSample * dt_s_ - earliest_s;
-  Eigen::VectorXd all(kPositionClock + 1);
-  all << std::log(m.kp), std::log(m.b1), std::log(m.b2), logit(inside(m.alpha - 1)), logit(inside(m.beta)),
-      point.offset_m / offset_scale_m_, logit(dead_time_share),
-      logit(inside((sensor.first_s - earliest_s) / sensor_span_s)), (sensor.period_s / dt_s_ - 1) * record_ticks(),
-      logit(inside(sensor.time_constant_s / (kLongestTimeConstant * dt_s_))), point.position_clock_s / kClockScaleS;
-  return all(free_parameters(structure));
-}
-
-SearchPoint OutputErrorSearch::point_at(Structure structure, const Eigen::VectorXd& x) const {
-  SearchPoint point{{1, 0, 1, 1, 2, 1}, 0, sensor_start_.sensor};
-  const double earliest_s = earliest_sample_s(), sensor_span_s = kLatestSample * dt_s_ - earliest_s;
-  const std::vector<int> free = free_parameters(structure);
-  for (std::size_t j = 0; j < free.size(); ++j) {
-    const double value = x[static_cast<Index>(j)];
-    switch (free[j]) {
-      case 0: point.model.kp = std::exp(value); break;
-      case 1: point.model.b1 = std::exp(std::clamp(value, -kLargestLog, kLargestLog)); break;
-      case 2: point.model.b2 = std::exp(std::clamp(value, -kLargestLog, kLargestLog)); break;
-      case 3: point.model.alpha = 1 + logistic(value); break;
-      case 4: point.model.beta = logistic(value); break;
-      case kOffset: point.offset_m = value * offset_scale_m_; break;
-      case kSensorTime: point.sensor.first_s = earliest_s + logistic(value) * sensor_span_s; break;
-      case kSensorPeriod: point.sensor.period_s = dt_s_ * (1 + value / record_ticks()); break;
-      case kPositionClock:
-        point.position_clock_s = std::clamp(value, -kLargestClock, kLargestClock) * kClockScaleS;
-        break;
-      case kSensorTimeConstant: point.sensor.time_constant_s = logistic(value) * kLongestTimeConstant * dt_s_; break;
-      default: point.model.dead_time_s = logistic(value) * options_.longest_dead_time_s;
-    }
-  }
-  return point;
-}
-
-Eigen::VectorXd OutputErrorSearch::coordinate_slopes(Structure structure, const SearchPoint& point) const {
-  const FractionalModel& m = point.model;
-  const double longest_s = options_.longest_dead_time_s;
-  const double earliest_s = earliest_sample_s(), sensor_span_s = kLatestSample * dt_s_ - earliest_s;
-  const double time_share = (point.sensor.first_s - earliest_s) / sensor_span_s;
-  const double low_pass_share = point.sensor.time_constant_s / (kLongestTimeConstant * dt_s_);
-  Eigen::VectorXd all(kPositionClock + 1);
-  all << 1, 1, 1, (m.alpha - 1) * (2 - m.alpha), m.beta * (1 - m.beta), offset_scale_m_,
-      longest_s > 0 ? point.model.dead_time_s * (1 - point.model.dead_time_s / longest_s) : 0,
-      sensor_span_s * time_share * (1 - time_share), dt_s_ / record_ticks(),
-      kLongestTimeConstant * dt_s_ * low_pass_share * (1 - low_pass_share), kClockScaleS;
-  return all(free_parameters(structure));
-}
-
 double OutputErrorSearch::cost(const SearchPoint& point) {
   const auto parts = residuals(point);
   double sum = 0;
@@ -234,20 +169,21 @@ double OutputErrorSearch::cost(const SearchPoint& point) {
   return sum;
 }
 
-double OutputErrorSearch::absolute_cost(const SearchPoint& point) {
+double OutputErrorSearch::absolute_cost(Structure structure, const SearchPoint& point) {
   const auto parts = residuals(point);
   double sum = 0;
   for (std::size_t c = 0; c < parts.size(); ++c) sum += (parts[c] / measured_[c].sd).lpNorm<1>();
-  return sum;
+  return sum + prior_weight_ * prior_weight_ / 2 * prior_residuals(structure, point).squaredNorm();
 }
 
-bool OutputErrorSearch::weighed_residuals(const SearchPoint& point, Eigen::VectorXd& residual) {
+bool OutputErrorSearch::weighed_residuals(Structure structure, const SearchPoint& point, Eigen::VectorXd& residual) {
   const auto parts = residuals(point);
   if (limit_.is_reached()) return false;
   Index row = 0;
   for (std::size_t c = 0; c < parts.size(); ++c, row += rows_) {
     residual.segment(row, rows_) = parts[c].cwiseProduct(measured_[c].root_weight) / measured_[c].sd;
   }
+  residual.tail(residual.size() - row) = prior_weight_ * prior_residuals(structure, point);
   return true;
 }
 
@@ -260,15 +196,16 @@ bool OutputErrorSearch::weighed_slopes(Structure structure, const SearchPoint& p
     const Measured& measured = measured_[c];
     slopes.middleRows(row, rows_) = (measured.root_weight / -measured.sd).asDiagonal() * parts[c] * chain.asDiagonal();
   }
+  slopes.bottomRows(slopes.rows() - row) = prior_weight_ * prior_slopes(structure, point) * chain.asDiagonal();
   return true;
 }
 
 SearchEnd OutputErrorSearch::descend(Structure structure, SearchPoint& point, int iteration_limit, Progress progress,
                                      const KnownMinimum* known) {
   SquaresToMinimise squares;
-  squares.values = rows_ * static_cast<Index>(measured_.size());
+  squares.values = rows_ * static_cast<Index>(measured_.size()) + prior_residuals(structure, point).size();
   squares.residuals = [&](const Eigen::VectorXd& x, Eigen::VectorXd& residual) {
-    return weighed_residuals(point_at(structure, x), residual);
+    return weighed_residuals(structure, point_at(structure, x), residual);
   };
   squares.slopes = [&](const Eigen::VectorXd& x, Eigen::MatrixXd& slopes) {
     return weighed_slopes(structure, point_at(structure, x), slopes);
@@ -294,6 +231,7 @@ SearchResult OutputErrorSearch::run(Structure structure, int parts) {
     measured.sd = scale_of(measured.measured);
     measured.root_weight.setOnes();
   }
+  prior_weight_ = reading_sd_m_s2_ / measured_.front().sd;
   SearchResult result;
   limit_.begin_share(parts);
   stop_ = [this] { return limit_.is_reached(); };
@@ -359,7 +297,8 @@ void OutputErrorSearch::refine_channel_weights(Structure structure, SearchResult
 
 // Weights 1/|r| make the squares of (1) the absolute values of (2); each round must lower (2), or is the last.
 void OutputErrorSearch::refine_absolute_error(Structure structure, SearchResult& result) {
-  double lowest = absolute_cost(result.point);
+  prior_weight_ = std::sqrt(kMeanSize * reading_sd_m_s2_ / measured_.front().sd);  // (2) has no squares
+  double lowest = absolute_cost(structure, result.point);
   if (limit_.is_reached()) return;
   result.end = SearchEnd::iteration_limit;
   SearchPoint point = result.point;
@@ -376,7 +315,7 @@ void OutputErrorSearch::refine_absolute_error(Structure structure, SearchResult&
     result.iterations = last_iterations_;
     if (end == SearchEnd::not_finite) result.end = end;
     if (limit_.end() || end == SearchEnd::not_finite) return;
-    const double found = absolute_cost(point);
+    const double found = absolute_cost(structure, point);
     if (limit_.is_reached()) return;
     small_gains = found > lowest * (1 - 1e-8) ? small_gains + 1 : 0;
     if (found < lowest) lowest = found, result.point = point;

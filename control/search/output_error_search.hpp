@@ -6,6 +6,8 @@
 //   of a position with times of its own: y - output at these times plus a shift - offset           (5)   weighed by
 //   (1) of position_weight.hpp
 //   q = ln kp, ln b1, ln b2, ln((α - 1)/(2 - α)), ln(β/(1 - β)), offset, ln(τ/(longest - τ))         (3)   unbounded
+//   of the acceleration besides: Σ_j ((n_j - data sheet)/sd_j)², n: the sensor's lag, clock and low pass   (6)
+//   in units of the noise, sensor_prior.hpp; (1) is minimised together with it
 //
 // Each start descends (descent.hpp). Its gain is the best for its other parameters, which are the Newtonian model's for
 // the first: so the units of the output do not matter. The dead time's start is scanned for on a short piece of the
@@ -89,6 +91,10 @@ class OutputErrorSearch {
   std::vector<Eigen::VectorXd> residuals(const SearchPoint& point);
   // Of the outputs with respect to ln kp, ln b1, ln b2, alpha, beta, offset, dead time, as far as they are free.
   std::vector<Eigen::MatrixXd> jacobians(Structure structure, const SearchPoint& point);
+  // Of the sensor, once it is found: (6) of each of its free parameters in sds, and the slopes by the free parameters.
+  Eigen::VectorXd prior_residuals(Structure structure, const SearchPoint& point) const;
+  Eigen::MatrixXd prior_slopes(Structure structure, const SearchPoint& point) const;
+  double reading_sd_m_s2() const { return reading_sd_m_s2_; }  // of the noise in which (6) counts
   // By the model's five parameters, as they are measured, if the duty had been this one; and the model's velocity.
   std::vector<Eigen::MatrixXd> model_slopes(const std::vector<double>& duty, const SearchPoint& point) const;
   std::vector<double> model_velocity_m_s(const SearchPoint& point);
@@ -110,24 +116,27 @@ class OutputErrorSearch {
   Eigen::VectorXd seen(const Measured& measured, const SearchPoint& point, const Eigen::VectorXd& output) const;
   Eigen::VectorXd seen_offset(const Measured& measured) const;  // of 1 m
   SensorTiming rough_timing() const;
+  SensorTiming sensor_start(int index) const;
   double earliest_sample_s() const;
   double record_ticks() const { return static_cast<double>(samples_); }
   void find_delay(SearchPoint& point);
   bool find_own_clock(SearchPoint& point);
   bool descend_again(SearchPoint& point);
-  double sensor_sd(const SearchPoint& point);            // of a reading
+  double sensor_sd(const SearchPoint& point);  // of a reading
+  void set_reading_sd(double sd_m_s2);
+  std::vector<int> parameters_with_prior(Structure structure) const;
   double reading_lag_s(const SearchPoint& point) const;  // dead time and all, its sampling aside
   void run_starts(Structure structure, SearchResult& result);
   void make_scan(const Recording& recording);
   SearchEnd descend(Structure structure, SearchPoint& point, int iteration_limit, Progress progress,
                     const KnownMinimum* known = nullptr);
   // What it minimises; false: the limit is reached.
-  bool weighed_residuals(const SearchPoint& point, Eigen::VectorXd& residual);
+  bool weighed_residuals(Structure structure, const SearchPoint& point, Eigen::VectorXd& residual);
   bool weighed_slopes(Structure structure, const SearchPoint& point, Eigen::MatrixXd& slopes);  // by (3)
   void refine_channel_weights(Structure structure, SearchResult& result);
   void refine_absolute_error(Structure structure, SearchResult& result);
-  double cost(const SearchPoint& point);           // (1)
-  double absolute_cost(const SearchPoint& point);  // (2)
+  double cost(const SearchPoint& point);                                // (1)
+  double absolute_cost(Structure structure, const SearchPoint& point);  // (2)
 
   IdentificationOptions options_;
   double dt_s_;
@@ -138,7 +147,8 @@ class OutputErrorSearch {
   double offset_scale_m_ = 1;
   bool sensor_is_found_ = false;
   std::optional<SearchEnd> sensor_search_end_;
-  SearchPoint sensor_start_;  // what the search for it ended with
+  SearchPoint sensor_start_;                       // what the search for it ended with
+  double reading_sd_m_s2_ = 0, prior_weight_ = 0;  // the noise of a reading; the root of the weight of (6) in (1)
   int last_iterations_ = 0;
   double last_cost_ = 0;  // of the last descent, by its own weights
   long outputs_computed_ = 0;

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "control/search/output_error_search.hpp"
+#include "control/sensor/sensor_prior.hpp"
 
 namespace control {
 namespace {
@@ -13,6 +14,9 @@ using Eigen::Index;
 constexpr std::size_t kScanSamples = 4000;   // of the piece on which dead times are tried
 constexpr std::size_t kFewestSamples = 100;  // of the piece
 constexpr double kScanDeadTimes = 4;         // the length of the piece, at least, in longest dead times
+constexpr double kAgesTried = 0.3;           // ticks, either way
+constexpr double kLowPassesTried = 0.7;      // of the data sheet's: from half of it to twice
+constexpr double kClocksTried = 0.1;         // ticks over the whole record, either way
 
 // 1/2, 1/4, 3/4, 1/8, 5/8, ... for 1, 2, ...: spread evenly however many are taken.
 double spread(int index) {
@@ -59,7 +63,19 @@ SearchPoint OutputErrorSearch::start(Structure structure, int index) const {
   }
   if (structure != Structure::fractional) model.alpha = 2, model.beta = 1;
   if (structure == Structure::first_order) model.b1 = 0;
-  return {model, 0, sensor_start_.sensor};
+  return {model, 0, sensor_start(index)};
+}
+
+// The sensor's age, low pass and clock vary from start to start, as the model does.
+SensorTiming OutputErrorSearch::sensor_start(int index) const {
+  SensorTiming timing = sensor_start_.sensor;
+  if (index == 0 || !sensor()) return timing;
+  timing.first_s += kAgesTried * dt_s_ * (2 * spread(5 * index + 2) - 1);
+  timing.time_constant_s = kDataSheetTimeConstantS * std::exp(kLowPassesTried * (2 * spread(7 * index + 3) - 1));
+  if (sensor()->has_own_clock()) {
+    timing.period_s += kClocksTried * dt_s_ * (2 * spread(3 * index + 2) - 1) / record_ticks();
+  }
+  return timing;
 }
 
 bool OutputErrorSearch::fit_gain(SearchPoint& point) {

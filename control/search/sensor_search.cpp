@@ -4,13 +4,14 @@
 
 #include "control/search/output_error_search.hpp"
 #include "control/sensor/sensor_clock.hpp"
+#include "control/sensor/sensor_prior.hpp"
 
 namespace control {
 namespace {
 
 using Eigen::Index;
 
-constexpr double kRoughAge = 0.75, kRoughTimeConstant = 0.25;  // in ticks: half a sample period and a low pass
+constexpr double kRoughAge = 0.75;  // in ticks: half a sample period and a low pass
 constexpr double kDelaysTried = 200;
 constexpr double kClearlyBetter =
     30;                              // in twice the log likelihood, for a clock of three unknowns that was scanned for
@@ -27,11 +28,16 @@ constexpr int kRoundsAtLeast = 3;
 
 }  // namespace
 
-SensorTiming OutputErrorSearch::rough_timing() const { return {-kRoughAge * dt_s_, dt_s_, kRoughTimeConstant * dt_s_}; }
+SensorTiming OutputErrorSearch::rough_timing() const { return {-kRoughAge * dt_s_, dt_s_, kDataSheetTimeConstantS}; }
 
 double OutputErrorSearch::sensor_sd(const SearchPoint& point) {
   const double count = static_cast<double>(std::max<Index>(1, sensor()->weighed_samples()));
   return residuals(point).front().norm() / std::sqrt(count);
+}
+
+void OutputErrorSearch::set_reading_sd(double sd_m_s2) {
+  reading_sd_m_s2_ = sd_m_s2;
+  prior_weight_ = sd_m_s2 / measured_.front().sd;
 }
 
 void OutputErrorSearch::find_sensor(int parts) {
@@ -53,8 +59,9 @@ void OutputErrorSearch::find_sensor(int parts) {
     const double earlier_ticks = std::floor(-rough.point.sensor.first_s / dt_s_ - kRoughAge / 2);
     path.set_delay(std::max<Index>(0, static_cast<Index>(earlier_ticks)));
     rough.point.sensor.first_s += dt_s_ * static_cast<double>(path.delay_ticks());
+    set_reading_sd(sensor_sd(rough.point));
     path.leave_out_failed_reads(path.sampled(measured_.front().model.output(rough.point.model), rough.point.sensor),
-                                sensor_sd(rough.point));
+                                reading_sd_m_s2_);
     descend_again(rough.point);
     const SearchPoint in_step = rough.point;
     const double sd_in_step = sensor_sd(in_step);
@@ -67,6 +74,7 @@ void OutputErrorSearch::find_sensor(int parts) {
                                   sd_in_step);
     }
     sensor_start_ = rough.point;
+    set_reading_sd(sensor_sd(rough.point));
   }
   sensor_search_end_ = limit_.end();
   stop_ = {};
@@ -103,6 +111,7 @@ bool OutputErrorSearch::find_own_clock(SearchPoint& point) {
     const Eigen::VectorXd rest = measured.measured - path.sampled(output, point.sensor);
     const Eigen::VectorXd readings = measured.measured - path.bias(rest);
     const double sd = sensor_sd(point);
+    set_reading_sd(sd);
     const ClockEvidence evidence{dt_s_, expected, readings, path.is_repeated(), sd, stop_};
     if (round == 0) {
       const auto clock = find_clock(evidence, point.sensor.time_constant_s);

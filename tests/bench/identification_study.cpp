@@ -1,9 +1,19 @@
-// Prints how well the fit of the acceleration finds five fluids: identification_study [SEEDS [FIRST]].
+// Prints how well the fit of the acceleration finds five fluids: identification_study [SEEDS [FIRST]]; or how often the
+// truth is within the sigmas of six others, each with the script of a scenario: identification_study coverage FILE
+// [SEEDS [FIRST]]. The fluid of the file comes first, then five of tests/control/fluid_family.hpp.
 #include <algorithm>
+#include <array>
 #include <chrono>
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
 
+#include "sim_robot/scenario/scenario.hpp"
+#include "tests/control/fluid_family.hpp"
 #include "tests/sim_robot/identification_trial.hpp"
 
 namespace {
@@ -36,13 +46,90 @@ Row study(const control::FractionalModel& fluid, int seeds, int first) {
   return row;
 }
 
+constexpr unsigned kFamilySeed = 20261129;
+constexpr int kFamilyFluids = 5;
+
+std::array<double, control::kParameters> values_of(const control::FractionalModel& m) {
+  return {m.kp, m.b1, m.b2, m.alpha, m.beta};
+}
+
+double median_of(std::vector<double> values) {
+  std::ranges::sort(values);
+  return values[values.size() / 2];
+}
+
+struct Coverage {
+  int fits = 0, within_4 = 0, white = 0, clocks = 0;
+  std::array<int, control::kParameters> within_2{};
+  std::array<std::vector<double>, control::kParameters> sigmas{};
+};
+
+// From one start each, as the study of the five fluids.
+Coverage coverage_of(const std::string& file, const control::FractionalModel& fluid, int seeds, int first) {
+  const control::IdentificationOptions options = sim_robot::one_start_options();
+  Coverage found;
+  const auto truth = values_of(fluid);
+  for (int seed = first; seed < first + seeds; ++seed) {
+    const auto recording = sim_robot::record_played(file, static_cast<std::uint64_t>(seed), fluid);
+    const control::Fit fit = control::identify(recording, options).best;
+    const auto values = values_of(fit.model);
+    double worst = 0;
+    for (std::size_t i = 0; i < control::kParameters; ++i) {
+      const double sigma = fit.one_sigma[i].value_or(0), sigmas = std::abs(values[i] - truth[i]) / sigma;
+      found.within_2[i] += sigmas <= 2 ? 1 : 0;
+      found.sigmas[i].push_back(sigma);
+      worst = std::max(worst, sigmas);
+    }
+    ++found.fits;
+    found.within_4 += worst <= 4 ? 1 : 0;
+    found.white += fit.residuals_are_white ? 1 : 0;
+    found.clocks += fit.sensor->has_own_clock ? 1 : 0;
+  }
+  return found;
+}
+
+void print_coverage(const control::FractionalModel& fluid, const Coverage& found) {
+  std::printf("| %g, %.4g, %.4g, %.5g, %.4g | %d of %d |", fluid.kp, fluid.b1, fluid.b2, fluid.alpha, fluid.beta,
+              found.within_4, found.fits);
+  int all = 0;
+  for (std::size_t i = 0; i < control::kParameters; ++i) {
+    all += found.within_2[i];
+    std::printf(" %.0f %% (%.2g) |", 100.0 * found.within_2[i] / found.fits, median_of(found.sigmas[i]));
+  }
+  const int values = found.fits * static_cast<int>(control::kParameters);
+  std::printf(" %.1f %% | %d | %d |\n", 100.0 * all / values, found.white, found.clocks);
+  std::fflush(stdout);
+}
+
+void study_coverage(const std::string& file, int seeds, int first) {
+  std::printf("| kp, b1, b2, alpha, beta (%d seeds from %d) | all within 4 sigma | kp within 2 sigma (median sigma) ",
+              seeds, first);
+  std::printf("| b1 | b2 | alpha | beta | all five | white | own clock |\n|---|---|---|---|---|---|---|---|---|---|\n");
+  std::vector<control::FractionalModel> fluids = control::fluid_family(kFamilyFluids, kFamilySeed);
+  fluids.insert(fluids.begin(), sim_robot::load_scenario(file).robot.world.plant.model);
+  int fits = 0, within_4 = 0, within_2 = 0;
+  for (const auto& fluid : fluids) {
+    const Coverage found = coverage_of(file, fluid, seeds, first);
+    print_coverage(fluid, found);
+    fits += found.fits;
+    within_4 += found.within_4;
+    for (const int within : found.within_2) within_2 += within;
+  }
+  std::printf("all within 4 sigma: %.1f %% of %d fits; within 2 sigma: %.1f %% of %d values\n", 100.0 * within_4 / fits,
+              fits, 100.0 * within_2 / (fits * static_cast<int>(control::kParameters)),
+              fits * static_cast<int>(control::kParameters));
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
+  std::optional<std::string> file;
+  if (argc > 2 && std::string_view{argv[1]} == "coverage") file = argv[2], argv += 2, argc -= 2;
   const int seeds = argc > 1 ? std::atoi(argv[1]) : 40;
   const int first = argc > 2 ? std::atoi(argv[2]) : 1;
   if (seeds < 1) return std::fprintf(stderr, "identification_study: SEEDS '%s' is no positive number\n", argv[1]), 2;
   if (first < 1) return std::fprintf(stderr, "identification_study: FIRST '%s' is no positive number\n", argv[2]), 2;
+  if (file) return study_coverage(*file, seeds, first), 0;
   std::printf(
       "| kp, b1, b2, alpha, beta (%d seeds from %d) | response within 2 %% | worst | parameters within 3 sigma | worst "
       "| "

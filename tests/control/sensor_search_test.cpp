@@ -114,6 +114,24 @@ TEST(SensorSearch, NamesAnOptionOnlyToThoseWhoHaveIt) {
   EXPECT_THAT(identify(run, options).warnings, Contains(HasSubstr("search for the dead time (--dead-time-s)")));
 }
 
+// Of a run in which the sensor hardly shows: a short step.
+TEST(SensorSearch, TheDataSheetCountsInTheSigmas) {
+  Recording run = acceleration_run(6, 0.05, 0);
+  OutputErrorSearch search(run, one_start());
+  search.find_sensor(2);
+  const SearchResult found = search.run(Structure::second_order);
+  const Eigen::VectorXd off = search.prior_residuals(Structure::second_order, found.point);
+  const Eigen::MatrixXd slopes = search.prior_slopes(Structure::second_order, found.point);
+  ASSERT_EQ(off.size(), 2);  // in step with the ticks: lag and low pass
+  EXPECT_LT(off.cwiseAbs().maxCoeff(), 1.5);
+  EXPECT_EQ(slopes.cols(), std::ssize(search.free_parameters(Structure::second_order)));
+  SearchPoint slower = found.point;
+  slower.sensor.time_constant_s *= 1.001;
+  const Eigen::VectorXd moved = search.prior_residuals(Structure::second_order, slower) - off;
+  EXPECT_NEAR(moved[1], slopes(1, slopes.cols() - 1) * 0.001 * found.point.sensor.time_constant_s, 1e-4);
+  EXPECT_NEAR(moved[0], 0, 1e-12);
+}
+
 TEST(SensorSearch, DoubtsALagOfTheSensorThatTheReadingsDoNotHave) {
   const auto is_said = Contains(HasSubstr("less than the sensor's own lag that was given"));
   for (const double sensor_lag_s : {0.06, 2.0}) {

@@ -6,6 +6,7 @@
 #include <random>
 
 #include "control/responses/time_response.hpp"
+#include "sim_robot/lab/scenario_run.hpp"
 #include "sim_robot/lab/station_peer.hpp"
 #include "sim_robot/world/imu.hpp"
 #include "sim_robot/world/tick.hpp"
@@ -83,6 +84,23 @@ control::Recording record(const IdentificationTrial& trial, std::uint64_t seed) 
   for (auto sample = station.samples.lower_bound(begins); sample != station.samples.end(); ++sample) {
     recording.duty.push_back(static_cast<double>(sample->second.duty));
     recording.acceleration_m_s2.push_back(static_cast<double>(sample->second.acceleration_m_s2));
+  }
+  return recording;
+}
+
+control::Recording record_played(const std::string& file, std::uint64_t seed,
+                                 const std::optional<control::FractionalModel>& fluid) {
+  Scenario scenario = load_scenario(file);
+  scenario.robot.boot_id = 1;
+  scenario.robot.world.seed = seed;
+  if (fluid) scenario.robot.world.plant.model = *fluid;
+  ScenarioRun run{scenario};
+  run.run();
+  control::Recording recording;
+  recording.dt_s = SimulatedRobot::kPeriodS;
+  for (const auto& [seq, sample] : run.station().samples) {
+    recording.duty.push_back(static_cast<double>(sample.duty));
+    recording.acceleration_m_s2.push_back(static_cast<double>(sample.acceleration_m_s2));
   }
   return recording;
 }

@@ -4,6 +4,8 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
+#include <string>
 #include <vector>
 
 #include "control/identification/identify.hpp"
@@ -36,6 +38,11 @@ std::vector<double> study_duty();
 
 // What the station records of the trial: the duty as it was driven, and the acceleration.
 control::Recording record(const IdentificationTrial& trial, std::uint64_t seed);
+
+// What the station records of a scenario's script, in another fluid if one is given: as `rheonaut-sim play FILE
+// --seed`.
+control::Recording record_played(const std::string& file, std::uint64_t seed,
+                                 const std::optional<control::FractionalModel>& fluid = std::nullopt);
 
 // The same with the true position and a measuring device's white noise, and no robot.
 control::Recording record_position(const IdentificationTrial& trial, double sd_m, std::uint64_t seed);
