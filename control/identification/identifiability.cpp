@@ -203,7 +203,7 @@ std::vector<std::string> search_doubts(const Fit& fit, const IdentificationOptio
     warnings.push_back(
         base::join_text("the search ", end_words(fit.end),
                         " before its first iteration: the parameters are the paper's start, with the best "
-                        "gain, and say nothing; raise the limit"));
+                        "gain, and say nothing"));
   } else if (fit.end == SearchEnd::not_finite) {
     warnings.push_back(
         base::join_text("the search ", end_words(fit.end), " after ", fit.iterations,
@@ -211,7 +211,8 @@ std::vector<std::string> search_doubts(const Fit& fit, const IdentificationOptio
   } else if (fit.end != SearchEnd::converged) {
     warnings.push_back(base::join_text("the search ", end_words(fit.end), " after ", fit.iterations,
                                        " iterations of start ", fit.starts, " of ", 1 + options.further_starts,
-                                       ": the parameters are the best so far, not the optimum; raise the limit"));
+                                       ": the parameters are the best so far, not the optimum; record a longer run, or "
+                                       "one in which the duty changes faster"));
   }
   if (dead_time_is_at_its_limit(fit, options)) {
     warnings.push_back(base::join_text("the dead time, ", fit.model.dead_time_s,

@@ -28,6 +28,12 @@ double best_offset_m(OutputErrorSearch& search, const SearchPoint& point) {
 
 }  // namespace
 
+Identification out_of_time() {
+  Identification none;
+  none.best.end = SearchEnd::time_limit;
+  return none;
+}
+
 Identification identify(const Recording& recording, const IdentificationOptions& options) {
   check_recording(recording);
   check_options(options, recording);
@@ -35,12 +41,12 @@ Identification identify(const Recording& recording, const IdentificationOptions&
   std::vector<Structure> structures{Structure::first_order, Structure::second_order, Structure::fractional};
   if (options.structure) structures = {*options.structure};
 
-  if (!recording.acceleration_m_s2.empty()) search.find_sensor(static_cast<int>(structures.size()) + 1);
+  if (!recording.acceleration_m_s2.empty()) search.find_sensor();
   Identification result;
   std::map<Structure, SearchPoint> points;
-  int left = static_cast<int>(structures.size());
   for (const Structure structure : structures) {
-    const SearchResult found = search.run(structure, left--);
+    const SearchResult found = search.run(structure);
+    if (search.limit().has_passed()) return out_of_time();
     points[structure] = found.point;
     result.compared.push_back(summary(search, recording, options.cost, structure, found));
   }
@@ -51,7 +57,6 @@ Identification identify(const Recording& recording, const IdentificationOptions&
   const auto add = [&](std::vector<std::string> more) { std::ranges::move(more, std::back_inserter(warnings)); };
   add(unit_doubts(recording));
   add(search_doubts(result.best, options));  // causes first, then what follows from them
-  add(sensor_doubts(search));
   add(lag_doubts(recording, options, result.best));
   add(untried_structures(result.compared));
   add(second_opinions(search, recording, options, result.best));
@@ -61,6 +66,7 @@ Identification identify(const Recording& recording, const IdentificationOptions&
   add(identifiability_warnings(recording, result.best, options));
   add_verdict(result.compared, 1, warnings);
   add_rival(result.compared, warnings);
+  if (search.limit().has_passed()) return out_of_time();  // a doubt may be missing
   return result;
 }
 
@@ -71,7 +77,7 @@ Fit evaluate(const FractionalModel& model, const Recording& recording, const Ide
   fixed.longest_dead_time_s = model.dead_time_s;  // so that the output can be as late
   check_options(fixed, recording);
   OutputErrorSearch search(recording, fixed);
-  if (!recording.acceleration_m_s2.empty()) search.find_sensor(1);
+  if (!recording.acceleration_m_s2.empty()) search.find_sensor();
   SearchResult found;
   found.point = search.start(Structure::fractional, 0);
   found.point.model = normalised(model);
@@ -80,7 +86,8 @@ Fit evaluate(const FractionalModel& model, const Recording& recording, const Ide
     found.point.offset_m = best_offset_m(search, found.point);
   }
   search.keep_dead_time(model.dead_time_s, found.point);
-  found.end = search.sensor_search_end().value_or(SearchEnd::converged);
+  if (search.limit().has_passed()) return out_of_time().best;
+  found.end = search.limit().end().value_or(SearchEnd::converged);
   Fit fit = summary(search, recording, options.cost, Structure::fractional, found);
   fit.model.dead_time_s = model.dead_time_s;  // an acceleration shows only the sum of it and the sensor's delay
   if (fit.sensor) fit.sensor->delay_s -= model.dead_time_s;

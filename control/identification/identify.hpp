@@ -19,11 +19,12 @@
 //
 // Structures: fractional (20); second_order, (19) with α = 2, β = 1; first_order, b1 = 0, β = 1. One is chosen by AIC.
 // The search starts from the Newtonian model (28), as the paper does, and from further points against local minima.
-// The simplest structure is searched first; each may use an equal part of the time that is left, so what the simple
-// ones leave is the fractional one's. The AIC of a search that was cut off is only an upper bound: such a fit can be
-// the best, but is not taken to be worse than another, and a warning names it.
-// Errors: throws std::invalid_argument quoting the bad value for data that cannot be used. Not having converged, having
-// been cancelled, having run out of time or of finite numbers is a field of the result.
+// The simplest structure is searched first. Each search ends by its own counts of starts and iterations, so the same
+// data and options give the same bits however busy the machine is. A time limit that is reached leaves no model:
+// `best.end` is time_limit, and nothing else is set. The AIC of a search that was cancelled or reached its iteration
+// limit is only an upper bound: such a fit can be the best, but is not taken to be worse than another, and a warning
+// names it. Errors: throws std::invalid_argument quoting the bad value for data that cannot be used. Not having
+// converged, having been cancelled, having run out of time or of finite numbers is a field of the result.
 #pragma once
 
 #include <array>
@@ -59,6 +60,9 @@ struct Identification {
   std::vector<JointRun> runs;                  // of several recordings, in their order; empty: there was one
 };
 
+// Of a search that has reached its time limit.
+Identification out_of_time();
+
 Identification identify(const Recording& recording, const IdentificationOptions& options);
 
 // One model for several recordings of one robot in one fluid: each with its own offset, clock, sensor and noise, which
@@ -72,7 +76,7 @@ Identification identify_together(std::span<const Recording> recordings, const Id
 // fitted are the position's offset, and of an acceleration the sensor's bias, lag and clock. The lag comes on top of
 // the model's dead time: from half a period less, by which it is uncertain, to 6.5 periods more, which are the most
 // that a fit without a dead time takes for the age of the readings. No parameter has a sigma. The options' structure
-// and dead time are not looked at.
+// and dead time are not looked at. Where the time limit is reached `end` is time_limit, and nothing else is set.
 Fit evaluate(const FractionalModel& model, const Recording& recording, const IdentificationOptions& options = {});
 
 }  // namespace control

@@ -49,7 +49,6 @@ std::vector<std::string> doubts_of(JointSearch& search, std::size_t i, const Rec
                                    const std::optional<AmplitudeEvidence>& amplitude) {
   std::vector<std::string> warnings;
   append(warnings, unit_doubts(recording));
-  append(warnings, sensor_doubts(search.of_run(i)));
   append(warnings, lag_doubts(recording, options, fit));
   append(warnings, second_opinions(search.of_run(i), recording, options, fit));
   const bool order_is_forced = options.structure && *options.structure != Structure::fractional;
@@ -78,13 +77,13 @@ Identification identify_together(std::span<const Recording> recordings, const Id
   std::vector<Structure> structures{Structure::first_order, Structure::second_order, Structure::fractional};
   if (options.structure) structures = {*options.structure};
 
-  int left = static_cast<int>(structures.size());
-  search.find_sensors(left);
+  search.find_sensors();
   Identification result;
   std::map<Structure, JointResult> found;
   std::map<Structure, JointFit> fits;
   for (const Structure structure : structures) {
-    found[structure] = search.run(structure, left--);
+    found[structure] = search.run(structure);
+    if (search.is_out_of_time()) return out_of_time();
     fits[structure] = joint_summary(search, recordings, options.cost, structure, found[structure]);
     result.compared.push_back(fits[structure].all);
   }
@@ -100,6 +99,7 @@ Identification identify_together(std::span<const Recording> recordings, const Id
   append(warnings, identifiability_warnings(recordings[longest], result.runs[longest].fit, options, recordings.size()));
   add_verdict(result.compared, recordings.size(), warnings);
   add_rival(result.compared, warnings);
+  if (search.is_out_of_time()) return out_of_time();  // a doubt may be missing
   return result;
 }
 

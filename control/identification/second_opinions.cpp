@@ -275,13 +275,6 @@ void add_shifted_duty(OutputErrorSearch& search, const Recording& recording, con
 
 }  // namespace
 
-std::vector<std::string> sensor_doubts(const OutputErrorSearch& search) {
-  if (search.sensor_search_end() != SearchEnd::time_limit) return {};
-  return {
-      "the search for the sensor's timing reached its share of the time limit: its samples are taken to keep step "
-      "with the ticks, which they may not do, and the parameters make up for it; raise the limit"};
-}
-
 std::vector<std::string> lag_doubts(const Recording& recording, const IdentificationOptions& options, const Fit& fit) {
   if (!fit.sensor || fit.starts == 0) return {};
   const SensorFit& sensor = *fit.sensor;

@@ -6,7 +6,7 @@
 // (1) is the change of least squares with all parameters free, so a part of v0 that they can imitate does not count.
 // or first samples, 20 or one second of them, that fit three times worse than the rest.
 //   a duty that stands one row too early or too late: AIC lower by more than 10, where one linear step asks for it
-// Each costs one search at most, within the time that is left; none is tried when the search was cut off.
+// Each costs one search at most, within the time that is left; none is tried when the search was cancelled.
 // Errors: none thrown.
 #pragma once
 
@@ -20,9 +20,6 @@ namespace control {
 
 std::vector<std::string> second_opinions(OutputErrorSearch& search, const Recording& recording,
                                          const IdentificationOptions& options, const Fit& fit);
-
-// That the search for the sensor of an acceleration was cut off, which the fits that follow do not show.
-std::vector<std::string> sensor_doubts(const OutputErrorSearch& search);
 
 // Of an acceleration: how much of the age of its readings may be the plant's dead time, which looks the same, and to
 // which of the two it was attributed.

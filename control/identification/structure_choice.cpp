@@ -25,12 +25,12 @@ std::vector<std::string> untried_structures(const std::vector<Fit>& fits) {
   for (const Fit& fit : std::span(fits).subspan(1)) {
     if (fit.end == SearchEnd::converged) continue;
     const std::string name = structure_name(fit.structure);
-    warnings.push_back(
-        fit.starts == 0 ? base::join_text("the ", name, " model was not tried, since the search ", end_words(fit.end),
-                                          ": the one given may not be the best of the structures; raise the limit")
-                        : base::join_text("the search for the ", name, " model ", end_words(fit.end), " after ",
-                                          fit.starts, fit.starts == 1 ? " start" : " starts",
-                                          ": it may be better than it looks, and is not compared; raise the limit"));
+    warnings.push_back(fit.starts == 0 ? base::join_text("the ", name, " model was not tried, since the search ",
+                                                         end_words(fit.end),
+                                                         ": the one given may not be the best of the structures")
+                                       : base::join_text("the search for the ", name, " model ", end_words(fit.end),
+                                                         " after ", fit.starts, fit.starts == 1 ? " start" : " starts",
+                                                         ": it may be better than it looks, and is not compared"));
   }
   return warnings;
 }

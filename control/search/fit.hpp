@@ -62,7 +62,7 @@ struct IdentificationOptions {
   double longest_dead_time_s = 0;                    // 0: no dead time; else it is found in [0, this]
   int further_starts = 4;                            // beside the paper's
   int iteration_limit = 200;                         // per start
-  double time_limit_s = 60;                          // in all
+  double time_limit_s = 300;                         // in all; what reaches it has no result
   std::function<bool(const Progress&)> on_progress;  // return false to cancel
 
   // The clock of a position with times of its own may be off. Not beside a dead time, which is the same to the model.

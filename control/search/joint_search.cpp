@@ -38,12 +38,15 @@ JointSearch::JointSearch(std::span<const Recording> recordings, const Identifica
   }
 }
 
-void JointSearch::find_sensors(int structures) {
-  int left = static_cast<int>(runs()) + structures;
+void JointSearch::find_sensors() {
   for (const auto& search : searches_) {
-    if (search->sensor()) search->find_sensor(left);
-    --left;
+    if (search->sensor()) search->find_sensor();
   }
+}
+
+bool JointSearch::is_out_of_time() const {
+  return limit_.has_passed() ||
+         std::ranges::any_of(searches_, [](const auto& search) { return search->limit().has_passed(); });
 }
 
 void JointSearch::reset_weights() {
@@ -240,10 +243,9 @@ SearchEnd JointSearch::descend(Structure structure, Points& points, int iteratio
   return found.end;
 }
 
-JointResult JointSearch::run(Structure structure, int parts) {
+JointResult JointSearch::run(Structure structure) {
   reset_weights();
   JointResult result;
-  limit_.begin_share(parts);
   run_starts(structure, result);
   if (!limit_.end() && result.starts > 0) refine_weights(structure, result);
   if (!limit_.end() && result.starts > 0 && options_.cost == Cost::absolute_error) {

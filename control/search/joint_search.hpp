@@ -44,10 +44,11 @@ class JointSearch {
   std::size_t longest() const { return longest_; }  // of the runs, by its samples
   OutputErrorSearch& of_run(std::size_t run) { return *searches_[run]; }
 
-  // Of recorded accelerations, before the first run(): the number of structures that will be searched after it.
-  void find_sensors(int structures);
-  // Within one of parts equal shares of the time that is left. With no time at all the result is the paper's start.
-  JointResult run(Structure structure, int parts = 1);
+  // Of recorded accelerations, before the first run().
+  void find_sensors();
+  // With no time at all the result is the paper's start.
+  JointResult run(Structure structure);
+  bool is_out_of_time() const;  // of all together, or of the search of one run
   JointColumns columns(Structure structure) const;
 
  private:

@@ -226,14 +226,13 @@ SearchEnd OutputErrorSearch::descend(Structure structure, SearchPoint& point, in
   return found.end;
 }
 
-SearchResult OutputErrorSearch::run(Structure structure, int parts) {
+SearchResult OutputErrorSearch::run(Structure structure) {
   for (Measured& measured : measured_) {
     measured.sd = scale_of(measured.measured);
     measured.root_weight.setOnes();
   }
   prior_weight_ = reading_sd_m_s2_ / measured_.front().sd;
   SearchResult result;
-  limit_.begin_share(parts);
   stop_ = [this] { return limit_.is_reached(); };
   run_starts(structure, result);
   if (!limit_.end() && measured_.size() > 1) refine_channel_weights(structure, result);

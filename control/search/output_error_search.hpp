@@ -56,12 +56,11 @@ class OutputErrorSearch {
   OutputErrorSearch(const Recording& recording, const IdentificationOptions& options,
                     SearchLimit::Clock clock = steady_now_s);
 
-  // Within one of parts equal shares of the time that is left. With no time at all the result is the paper's start.
-  SearchResult run(Structure structure, int parts = 1);
+  // With no time at all the result is the paper's start.
+  SearchResult run(Structure structure);
 
-  // Of a recorded acceleration, before the first run(): which sample each tick reads. Within one of parts equal shares.
-  void find_sensor(int parts);
-  std::optional<SearchEnd> sensor_search_end() const { return sensor_search_end_; }  // what cut it off; none: nothing
+  // Of a recorded acceleration, before the first run(): which sample each tick reads.
+  void find_sensor();
   std::optional<SensorFit> sensor_fit(const SearchPoint& point);  // none: no acceleration was recorded
   double sensor_lag_s(const SearchPoint& point) const;            // dead time and all, its sampling aside
   double dead_time_s(const SearchPoint& point) const;
@@ -146,7 +145,6 @@ class OutputErrorSearch {
   Eigen::Index rows_;  // measured values of each channel: samples_, or of a position with times of its own their number
   double offset_scale_m_ = 1;
   bool sensor_is_found_ = false;
-  std::optional<SearchEnd> sensor_search_end_;
   SearchPoint sensor_start_;                       // what the search for it ended with
   double reading_sd_m_s2_ = 0, prior_weight_ = 0;  // the noise of a reading; the root of the weight of (6) in (1)
   int last_iterations_ = 0;

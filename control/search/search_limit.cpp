@@ -1,4 +1,4 @@
-// Compares the clock with the share's end, and calls the progress function after a long silence.
+// Compares the clock with the deadline, and calls the progress function after a long silence.
 #include "control/search/search_limit.hpp"
 
 #include <algorithm>
@@ -15,15 +15,7 @@ SearchLimit::SearchLimit(double limit_s, std::function<bool(const Progress&)> on
     : on_progress_(std::move(on_progress)),
       clock_(std::move(clock)),
       deadline_s_(clock_() + std::clamp(limit_s, 0.0, 1e6)),
-      share_end_s_(deadline_s_),
       last_reported_s_(clock_()) {}
-
-void SearchLimit::begin_share(int parts) {
-  if (end_ == SearchEnd::cancelled) return;
-  end_.reset();
-  const double now_s = clock_();
-  share_end_s_ = now_s + std::max(0.0, deadline_s_ - now_s) / std::max(1, parts);
-}
 
 void SearchLimit::report(const Progress& progress) {
   progress_ = progress;
@@ -33,13 +25,15 @@ void SearchLimit::report(const Progress& progress) {
 bool SearchLimit::is_reached() {
   if (end_) return true;
   const double now_s = clock_();
-  if (now_s >= share_end_s_) {
+  if (now_s >= deadline_s_) {
     end_ = SearchEnd::time_limit;
   } else if (now_s - last_reported_s_ >= kMostSilenceS) {
     ask_watcher(now_s);
   }
   return end_.has_value();
 }
+
+bool SearchLimit::has_passed() const { return end_ == SearchEnd::time_limit || (!end_ && clock_() >= deadline_s_); }
 
 double SearchLimit::left_s() const { return end_ == SearchEnd::cancelled ? 0 : std::max(0.0, deadline_s_ - clock_()); }
 

@@ -1,7 +1,8 @@
 // Ends a search after its time limit, or when the progress function cancels it; long steps check it, too.
 //
-// Once reached it stays reached: after the time limit until the next share begins, after cancelling for ever. The
-// progress function is called after every iteration, and at least each kMostSilenceS while the search checks.
+// Once reached it stays reached. What was found until then depends on how fast the machine was, so it is no result:
+// every search that gives one has ended by its counts of starts and iterations. The progress function is called after
+// every iteration, and at least each kMostSilenceS while the search checks.
 #pragma once
 
 #include <functional>
@@ -18,19 +19,19 @@ class SearchLimit {
 
   SearchLimit(double limit_s, std::function<bool(const Progress&)> on_progress, Clock clock);
 
-  void begin_share(int parts);  // what follows may use 1/parts of the time that is left
   void begin(const Progress& progress) { progress_ = progress; }
   void report(const Progress& progress);  // calls the progress function at once
   bool is_reached();
   std::optional<SearchEnd> end() const { return end_; }
-  double left_s() const;  // of the whole limit
+  bool has_passed() const;  // the time limit, also where no step of the search has checked it since
+  double left_s() const;
 
  private:
   void ask_watcher(double now_s);
 
   std::function<bool(const Progress&)> on_progress_;
   Clock clock_;
-  double deadline_s_, share_end_s_, last_reported_s_;
+  double deadline_s_, last_reported_s_;
   Progress progress_;
   std::optional<SearchEnd> end_;
 };

@@ -40,12 +40,11 @@ void OutputErrorSearch::set_reading_sd(double sd_m_s2) {
   prior_weight_ = sd_m_s2 / measured_.front().sd;
 }
 
-void OutputErrorSearch::find_sensor(int parts) {
+void OutputErrorSearch::find_sensor() {
   SensorPath& path = *measured_.front().path;
   path.set_in_step();
   sensor_is_found_ = false;
   sensor_start_.sensor = rough_timing();
-  limit_.begin_share(parts);
   stop_ = [this] { return limit_.is_reached(); };
   if (options_.longest_dead_time_s > 0) {
     SearchPoint point = start(Structure::fractional, 0);
@@ -76,7 +75,6 @@ void OutputErrorSearch::find_sensor(int parts) {
     sensor_start_ = rough.point;
     set_reading_sd(sensor_sd(rough.point));
   }
-  sensor_search_end_ = limit_.end();
   stop_ = {};
 }
 

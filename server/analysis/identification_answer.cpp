@@ -93,6 +93,7 @@ std::vector<std::string> channels_of(const control::Recording& recording) {
 
 control::Identification identify_run(const RunRecording& recorded, const control::IdentificationOptions& options) {
   control::Identification found = control::identify(recorded.recording, options);
+  if (is_out_of_time(found.best)) return found;
   found.warnings.insert(found.warnings.end(), recorded.warnings.begin(), recorded.warnings.end());
   add_outside_doubts(recorded, options, found.best, found.warnings);
   return found;
@@ -131,6 +132,7 @@ control::Identification identify_runs(std::span<const RunOfMany> runs, const con
     recordings.push_back(run.recorded.recording);
   }
   control::Identification found = control::identify_together(recordings, options);
+  if (is_out_of_time(found.best)) return found;
   for (std::size_t i = 0; i < runs.size(); ++i) {
     control::JointRun& run = found.runs[i];
     const std::vector<std::string>& of_recording = runs[i].recorded.warnings;

@@ -16,7 +16,10 @@ namespace server::analysis {
 
 std::vector<std::string> channels_of(const control::Recording& recording);
 
-// identify() on a piece of a run, and the warnings of both.
+// A search that has reached its time limit: what it found until then is no model.
+inline bool is_out_of_time(const control::Fit& fit) { return fit.end == control::SearchEnd::time_limit; }
+
+// identify() on a piece of a run, and the warnings of both. Out of time it has nothing but that.
 control::Identification identify_run(const RunRecording& recorded, const control::IdentificationOptions& options);
 
 // Of positions from outside, by the sds that their importer gave them; none where there are none.

@@ -47,22 +47,49 @@ OrderedJson quality_json(const control::Fit& fit) {
           {"whiteness_p_value", fit.whiteness_p_value}};
 }
 
-OrderedJson validation_json(const RunOfMany& run, const control::FractionalModel& model,
-                            const IdentifyRequest& request) {
-  OrderedJson answer = quality_json(control::evaluate(model, run.recorded.recording, request.search));
-  answer["run_id"] = run.run;
-  answer["channels"] = channels_of(run.recorded.recording);
+// Of a search, or of the same for the sensor of data on which a model is tried.
+Error out_of_time(double time_limit_s) {
+  return {
+      ErrorCode::conflict,
+      fmt::format("the search reached its time limit, {:g} s, so there is no model: raise the limit (rheonaut identify "
+                  "--time-limit-s; time_limit_s of a job, at most 600), or search for one structure or in a "
+                  "shorter part of the run",
+                  time_limit_s),
+      {}};
+}
+
+// Of a model on other data; the error: its time ran out.
+Result<OrderedJson> quality_on(const RunOfMany& run, const control::FractionalModel& model,
+                               const IdentifyRequest& request) {
+  const control::Fit fit = control::evaluate(model, run.recorded.recording, request.search);
+  if (is_out_of_time(fit)) return std::unexpected{out_of_time(request.search.time_limit_s)};
+  return quality_json(fit);
+}
+
+Result<OrderedJson> validation_json(const RunOfMany& run, const control::FractionalModel& model,
+                                    const IdentifyRequest& request) {
+  auto answer = quality_on(run, model, request);
+  if (!answer) return answer;
+  (*answer)["run_id"] = run.run;
+  (*answer)["channels"] = channels_of(run.recorded.recording);
   return answer;
 }
 
 // On one run as it always was; on several, one quality for each.
-OrderedJson in_use_json(std::span<const RunOfMany> runs, const ModelInUse& in_use, const IdentifyRequest& request) {
+Result<OrderedJson> in_use_json(std::span<const RunOfMany> runs, const ModelInUse& in_use,
+                                const IdentifyRequest& request) {
   OrderedJson answer;
   if (runs.size() == 1) {
-    answer = quality_json(control::evaluate(in_use.model, runs.front().recorded.recording, request.search));
+    auto quality = quality_on(runs.front(), in_use.model, request);
+    if (!quality) return quality;
+    answer = std::move(*quality);
   } else {
     answer["runs"] = OrderedJson::array();
-    for (const RunOfMany& run : runs) answer["runs"].push_back(validation_json(run, in_use.model, request));
+    for (const RunOfMany& run : runs) {
+      auto quality = validation_json(run, in_use.model, request);
+      if (!quality) return quality;
+      answer["runs"].push_back(std::move(*quality));
+    }
   }
   answer["fluid"] = in_use.fluid;
   answer["parameters"] = json_of(in_use.model);
@@ -91,13 +118,19 @@ Result<std::string> compute(std::span<const RunOfMany> runs, const RunOfMany* va
   control::Identification found =
       runs.size() == 1 ? identify_run(runs.front().recorded, search) : identify_runs(runs, search);
   if (run.is_cancelled()) return fail(ErrorCode::conflict, "cancelled");
+  if (is_out_of_time(found.best)) return std::unexpected{out_of_time(search.time_limit_s)};
   run.report(1, "trying the model on other data");
   const bool has_model = std::isfinite(found.best.sse);
   const control::FractionalModel model = found.best.model;
   OrderedJson answer = found_json(runs, std::move(found), request);
-  answer["validation"] =
-      validation != nullptr && has_model ? validation_json(*validation, model, request) : OrderedJson{};
-  answer["model_in_use"] = in_use ? in_use_json(runs, *in_use, request) : OrderedJson{};
+  Result<OrderedJson> others = OrderedJson{}, of_in_use = OrderedJson{};
+  if (validation != nullptr && has_model) others = validation_json(*validation, model, request);
+  if (in_use && others) of_in_use = in_use_json(runs, *in_use, request);
+  for (const auto* tried : {&others, &of_in_use}) {
+    if (!*tried) return std::unexpected{tried->error()};
+  }
+  answer["validation"] = std::move(*others);
+  answer["model_in_use"] = std::move(*of_in_use);
   return answer.dump();
 }
 

@@ -223,7 +223,8 @@ TEST(Identify, EndsWhenCancelled) {
   options.time_limit_s = 1e-9;
   const Identification untried = identify(recording, options);
   EXPECT_EQ(untried.best.end, SearchEnd::time_limit);
-  EXPECT_THAT(untried.warnings, Contains(HasSubstr("before its first iteration")));
+  EXPECT_EQ(untried.best.starts, 0);
+  EXPECT_TRUE(untried.compared.empty() && untried.warnings.empty());
 
   options = first_start_only();
   options.iteration_limit = 2;

@@ -198,7 +198,7 @@ TEST(IdentifyTogether, IsCancelledAndLimited) {
   const Identification none = identify_together(runs, options);
   EXPECT_EQ(none.best.end, SearchEnd::time_limit);
   EXPECT_EQ(none.best.starts, 0);
-  EXPECT_THAT(none.warnings, Contains(HasSubstr("before its first iteration")));
+  EXPECT_TRUE(none.compared.empty() && none.warnings.empty() && none.runs.empty());
 }
 
 TEST(IdentifyTogether, RefusesTooManyRecordings) {

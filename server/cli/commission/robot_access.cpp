@@ -24,7 +24,7 @@ constexpr std::int64_t kReleasePatienceUs = 2'000'000;
 constexpr std::int64_t kLatchedWithinUs = 5'000'000, kBeginsWithinUs = 50'000'000, kEndsLateUs = 30'000'000;
 constexpr std::int64_t kDigestWithinUs = 10'000'000, kFitWithinUs = 120'000'000;
 constexpr std::int64_t kFitWaitsUs = 600'000'000;  // behind the computations of others
-constexpr int kFitTimeLimitS = 60, kControlMs = 15'000, kPage = 1000;
+constexpr int kFitTimeLimitS = 110, kControlMs = 15'000, kPage = 1000;
 constexpr std::int64_t kControlAgainUs = 5'000'000;
 constexpr std::int64_t kAliveUs = 400'000;          // SAFETY: after so long a silence the station pauses a run
 constexpr microseconds kBeginPatience{30'000'000};  // of an experiment's request, which computes; nothing moves yet

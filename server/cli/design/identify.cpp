@@ -81,7 +81,7 @@ void add_search(CLI::App& command, control::IdentificationOptions& options) {
                   "Of a fitted acceleration: the sensor's own lag, beyond sampling and low pass; what comes later is "
                   "a dead time (default: not known)")
       ->check(non_negative());
-  command.add_option("--time-limit-s", options.time_limit_s, "Of the search (default: 60)")->check(positive());
+  command.add_option("--time-limit-s", options.time_limit_s, "Of the search (default: 300)")->check(positive());
 }
 
 void add_plan(CLI::App& command, Identify& options) {
@@ -294,6 +294,12 @@ int run(const Identify& options, std::ostream& out) {
     for (const std::string& warning : one.recorded.warnings) fmt::print(stderr, "rheonaut: warning: {}\n", warning);
   }
   const control::Identification found = search(options, runs);
+  if (analysis::is_out_of_time(found.best)) {
+    throw std::runtime_error{fmt::format(
+        "the search reached its time limit, {:g} s, so there is no model: raise --time-limit-s, or search for "
+        "one --structure or in a shorter part of the record",
+        options.search.time_limit_s)};
+  }
   if (options.form.is_json) {
     write_json(out, runs.size() == 1 ? analysis::answer_json(runs.front().recorded, found, options.with_residuals)
                                      : analysis::answer_json(runs, found, options.with_residuals));

@@ -86,6 +86,18 @@ TEST_F(JobRoutesTest, IdentifiesARunAndTriesTheModelOnAnother) {
   EXPECT_FALSE(listed[0].contains("result"));
 }
 
+TEST_F(JobRoutesTest, ASearchThatReachesItsTimeLimitHasNoModel) {
+  record({0.3, -0.5, 0.6, -0.2, 0.5, -0.3, 0.2, -0.6, 0.4, -0.1});
+  const json body = identify({{"time_limit_s", 0.1}, {"dead_time_s", 1}});  // a search of seconds
+  ASSERT_EQ(ask("POST", "/api/v1/jobs", body).status, 202);
+  const json job = ended(1);
+  EXPECT_EQ(job["state"], "failed") << job;
+  EXPECT_EQ(job["result"], nullptr);
+  EXPECT_THAT(job["error"].get<std::string>(),
+              AllOf(HasSubstr("the search reached its time limit, 0.1 s, so there is no model: raise the limit"),
+                    HasSubstr("time_limit_s of a job, at most 600")));
+}
+
 TEST_F(JobRoutesTest, IdentifiesSeveralRunsTogetherAndADesignNamesThem) {
   const json plant{{"kp", 0.2}, {"b1", 0.0}, {"b2", 0.5}, {"alpha", 2}, {"beta", 1}};
   const json model{{"model_gain_m_s", {0.1, 0, 0, 0}},

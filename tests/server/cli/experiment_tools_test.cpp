@@ -180,11 +180,13 @@ TEST_F(Identifying, ComparesTheStructuresInATable) {
   EXPECT_THAT(table.text, HasSubstr("one sigma"));
 }
 
-TEST_F(Identifying, ExitsWith4WhenTimeRunsOut) {
+TEST_F(Identifying, HasNoModelWhenTimeRunsOut) {
   save("run.csv", ask("step --duty 0.3 --every-s 0.01 --until-s 5 --csv").text);
   const Answer answer = ask("identify --csv @run.csv --structure fractional --time-limit-s 0.000001 --json");
-  EXPECT_EQ(answer.exit_code, 4);
-  EXPECT_EQ(answer.json()["end"], "time_limit");
+  EXPECT_EQ(answer.exit_code, 1);
+  EXPECT_EQ(answer.text, "");
+  EXPECT_THAT(answer.error, HasSubstr("the search reached its time limit, 1e-06 s, so there is no model: raise "
+                                      "--time-limit-s"));
 }
 
 TEST_F(Identifying, NumbersBeyondAllBoundsAreNoSuccess) {

@@ -109,10 +109,11 @@ TEST_F(UntilKnownTest, MakesNoMoreRunsThanTheProfileAllows) {
 }
 
 TEST_F(UntilKnownTest, SaysThatTheSearchWasCutOff) {
-  end_ = "time_limit";
+  end_ = "iteration_limit";
   for (int i = 0; i < 4; ++i) ASSERT_TRUE(next().value()) << i;
   EXPECT_FALSE(next().value());
-  EXPECT_THAT(until_.conclusion()->detail, HasSubstr("not determined after 4 runs (the search ended by time_limit)"));
+  EXPECT_THAT(until_.conclusion()->detail,
+              HasSubstr("not determined after 4 runs (the search ended by iteration_limit)"));
 }
 
 TEST_F(UntilKnownTest, AFitThatFailsIsAnError) {
@@ -139,7 +140,7 @@ TEST(FittedModel, IsReadFromTheResultOfAJob) {
   EXPECT_TRUE(fitted->is_of_acceleration);
   result["runs"] = {{{"channels", {"position_m"}}}};
   EXPECT_FALSE(fitted_model_from(5, result)->is_of_acceleration) << "of several runs each has its channels";
-  result["end"] = "time_limit";
+  result["end"] = "iteration_limit";
   EXPECT_FALSE(fitted_model_from(5, result)->one_sigma[3]) << "of a search that was cut off nothing is known";
   result["residual_sd"] = nullptr;
   EXPECT_EQ(fitted_model_from(5, result).error().reason, "no_model");

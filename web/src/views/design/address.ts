@@ -30,7 +30,7 @@ export interface Design {
 
 export const kCrossover = { from: 0.5, to: 100, usual: 3 };
 export const kMargin = { from: 1, to: 170, usual: 90 };
-export const kLimit = { from: 1, to: 600, usual: 60 };
+export const kLimit = { from: 1, to: 600, usual: 300 };
 export const kMostRuns = 8;
 
 export const kNothing: Design = {
