@@ -3,17 +3,23 @@
 //   auto job = [path] { return count_rows(path); };   // named, owns copies of all it uses
 //   const int rows = co_await disk.run(std::move(job));
 //
-// An exception of the job is rethrown in the waiting coroutine. Cancelling the coroutine does not cancel the job: the
-// wait ends when the job ends, so a job must be short or watch a stop token of its own. The worker outlives the loop's
-// run(); its destructor joins the thread. Declare it after the loop:
-// its thread may touch the loop for a moment after a result has arrived.
+// An exception of the job is rethrown in the waiting coroutine. Cancelling the coroutine does not cancel a job that has
+// begun: the wait ends when the job ends, so a job must be short or watch a stop token of its own. The worker outlives
+// the loop's run(); its destructor joins the thread. Declare it after the loop: its thread may touch the loop for a
+// moment after a result has arrived.
 #pragma once
 
+#include <atomic>
 #include <boost/asio/awaitable.hpp>
 #include <boost/asio/bind_cancellation_slot.hpp>
+#include <boost/asio/cancellation_type.hpp>
 #include <boost/asio/co_spawn.hpp>
+#include <boost/asio/error.hpp>
+#include <boost/asio/this_coro.hpp>
 #include <boost/asio/thread_pool.hpp>
 #include <boost/asio/use_awaitable.hpp>
+#include <boost/system/system_error.hpp>
+#include <memory>
 #include <string>
 #include <type_traits>
 #include <utility>
@@ -50,6 +56,21 @@ class WorkerThread {
     co_return co_await boost::asio::co_spawn(
         pool_, invoke<Value, Job>(std::move(job)),
         boost::asio::bind_cancellation_slot(not_cancellable, boost::asio::use_awaitable));
+  }
+
+  // The same for a job that only its caller needs: where that is cancelled before the job's turn, the job is left out,
+  // and boost::system::system_error{operation_aborted} is thrown.
+  // SAFETY: clients that ask and go, faster than this thread answers, keep no place of a port until their turn.
+  template <class Job>
+  boost::asio::awaitable<std::invoke_result_t<Job>> run_unless_cancelled(Job job) {
+    const auto is_cancelled = std::make_shared<std::atomic<bool>>(false);
+    auto slot = (co_await boost::asio::this_coro::cancellation_state).slot();
+    if (slot.is_connected()) slot.assign([is_cancelled](boost::asio::cancellation_type) { *is_cancelled = true; });
+    auto wanted = [is_cancelled, job = std::move(job)]() mutable {
+      if (*is_cancelled) throw boost::system::system_error{boost::asio::error::operation_aborted};
+      return job();
+    };
+    co_return co_await run(std::move(wanted));
   }
 
   // Jobs that were started and whose result has not reached its coroutine. Loop thread only.

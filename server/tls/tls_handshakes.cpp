@@ -50,7 +50,7 @@ asio::awaitable<TlsHandshakes::End> TlsHandshakes::shake_hands(StreamSocket& soc
   wire.begin_tls(*context_->ssl);
   for (;;) {
     auto step = [&wire] { return wire.shake_hands(); };
-    const base::Wire::Handshake reached = co_await worker_.run(std::move(step));
+    const base::Wire::Handshake reached = co_await worker_.run_unless_cancelled(std::move(step));
     if (!reached.failure.empty()) co_return End{Outcome::failed, reached.failure};
     if (reached.wait == base::Wire::Wait::none) co_return End{};
     const auto what = reached.wait == base::Wire::Wait::readable ? tcp::socket::wait_read : tcp::socket::wait_write;

@@ -140,6 +140,17 @@ class HostileTest(unittest.TestCase):
         self.assertEqual(status, 200)
         self.assertGreater(self.metric("http_connections_replaced_total"), 0)
 
+    def test_questions_about_what_has_ended_on_a_busy_computer(self):
+        """Each is a question to the database's reader, which is slower than those who ask and are ended."""
+        self.attack("polls")
+        path = "/api/v1/experiments/1/abort"  # of the one that they ask for
+        wait_until(lambda: self.station.request("POST", path, {})[0] in (200, 409), 60, "its end")
+        for _ in range(2):
+            loop = subprocess.Popen([sys.executable, "-c", "while True: pass"])
+            self.addCleanup(loop.wait)
+            self.addCleanup(loop.kill)
+        self.expect_stops(3)
+
     def test_without_a_descriptor_left(self):
         resource.prlimit(self.place.station_process.pid, resource.RLIMIT_NOFILE, (64, 64))
         host, port = self.station.endpoints["http"].rsplit(":", 1)

@@ -4,8 +4,8 @@
 //   const int rows = co_await reader.ask(std::move(query));
 //
 // Loop thread. The handle is opened by the first query and used on the worker's thread only. Queries are short, so that
-// no read transaction lasts long and a cancelled caller stops the work; longer work is a series of queries. The worker
-// outlives the reader.
+// no read transaction lasts long and a cancelled caller stops the work (a query that has not begun is left out); longer
+// work is a series of queries. The worker outlives the reader.
 #pragma once
 
 #include <SQLiteCpp/SQLiteCpp.h>
@@ -33,13 +33,13 @@ class DatabaseReader {
       if (!handle_) handle_ = std::make_unique<SQLite::Database>(open_for_reading(path_));
       return query(*handle_);
     };
-    co_return co_await worker_.run(std::move(job));
+    co_return co_await worker_.run_unless_cancelled(std::move(job));
   }
 
   // Runs job() on the same thread: for text that is made of what a query gave.
   template <class Job>
   boost::asio::awaitable<std::invoke_result_t<Job>> run(Job job) {
-    co_return co_await worker_.run(std::move(job));
+    co_return co_await worker_.run_unless_cancelled(std::move(job));
   }
 
   // After the loop's run() has returned: the last connection to close, the writer's, then removes the log.
