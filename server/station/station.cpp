@@ -110,25 +110,11 @@ Result<void> Station::set_fluid(const RobotId& id, const std::string& text, cons
   }
   const config::Envelope& envelope = parts_->envelope;
   const bool is_narrower = is_narrower_than(envelope.in(fluid), envelope.in(robot.fluid));
-  // SAFETY: what moves it beyond the new limits ends first; where that cannot be sent, nothing changes.
-  const bool is_beyond = is_narrower && !check_motion(robot, envelope.in(fluid), entry->orders_ahead());
-  if (is_beyond && !parts_->timed.bring_to_rest(*entry)) {
+  const std::string before = std::exchange(robot.fluid, fluid);
+  if (is_narrower && !parts_->end_beyond_limits(*entry)) {
+    robot.fluid = before;
     return fail(ErrorCode::unavailable,
                 "the robot moves beyond the limits of that fluid, and its link is full: ask again", "queue_full");
-  }
-  const std::string before = std::exchange(robot.fluid, fluid);
-  // SAFETY: what waits was held to the limits of before; what narrower ones refuse goes.
-  if (is_narrower) {
-    const auto is_refused = [&](const protocol::Command& command) {
-      return !check_command(command, robot, envelope, entry->orders_ahead());
-    };
-    parts_->timed.withdraw_queued(*entry, "limits_changed",
-                                  [&](const PendingCommand& pending) { return is_refused(pending.wire); });
-    const OrdersAhead ahead = entry->orders_ahead();
-    const bool is_any = std::ranges::any_of(ahead, [&](const OrderAhead& order) { return is_refused(*order.command); });
-    if (is_any || entry->timed.is_of_earlier_run) {
-      parts_->timed.drop_all(*entry, parts_->control.client_of(id), "limits_changed");
-    }
   }
   parts_->notifier.publish_fluid(robot);
   parts_->notifier.publish(AuditNote{by, id, "robot.fluid_set", fluid, fluid_detail(before)});

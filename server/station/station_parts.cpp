@@ -7,6 +7,7 @@
 #include <exception>
 #include <string_view>
 
+#include "server/station/commands/command_checks.hpp"
 #include "server/station/state/audit_details.hpp"
 
 namespace server::station {
@@ -54,6 +55,34 @@ void StationParts::end_right(RobotEntry& entry, const runtime::EndedRight& right
   if (entry.moves_for.empty() || !right.is_of(entry.moves_for)) return;
   if (!is_at_rest && !entry.robot.latched()) notifier.publish_rest_owed(entry.robot, right);
   entry.moves_for.clear();
+}
+
+// SAFETY: limits that have become narrower end what they would refuse: an unsent command is taken back; a motion, and
+// an order on its way that telemetry does not show yet, ends by an order to rest behind it; what waits for its time is
+// dropped. False: the order to rest cannot be sent.
+bool StationParts::end_beyond_limits(RobotEntry& entry) {
+  const RobotState& robot = entry.robot;
+  const auto is_refused = [&](const protocol::Command& command) {
+    OrdersAhead others = entry.orders_ahead();
+    std::erase_if(others, [&command](const OrderAhead& order) { return order.command == &command; });
+    return !check_command(command, robot, envelope, others);
+  };
+  timed.withdraw_queued(entry, "limits_changed",
+                        [&](const PendingCommand& pending) { return is_refused(pending.wire); });
+  const OrdersAhead ahead = entry.orders_ahead();
+  const bool is_order_refused = std::ranges::any_of(ahead, [&](const OrderAhead& order) {  // schedules: check_motion()
+    const bool is_now = !order.command->has_execute_at_robot_us && !is_schedule(*order.command);
+    return is_now && is_refused(*order.command);
+  });
+  const bool is_beyond = is_order_refused || !check_motion(robot, envelope.in(robot.fluid), ahead);
+  if (is_beyond && !timed.bring_to_rest(entry)) return false;
+  const bool is_timed_refused = std::ranges::any_of(ahead, [&](const OrderAhead& order) {
+    return order.command->has_execute_at_robot_us && is_refused(*order.command);
+  });
+  if (is_timed_refused || entry.timed.is_of_earlier_run) {
+    timed.drop_all(entry, control.client_of(robot.id), "limits_changed");
+  }
+  return true;
 }
 
 void StationParts::add_acting(const RobotEntry& entry, std::set<std::string>& actors) const {

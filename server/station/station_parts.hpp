@@ -35,7 +35,10 @@ struct StationParts {
   void publish(const Authority::Change& change, const std::string& actor, const std::string& peer);
   // What the robot does, or is about to do, in the name of somebody whose right has ended.
   void end_right(RobotEntry& entry, const runtime::EndedRight& right);
-  // Adds those in whose names that is.
+  // The robot's fluid is another one, whose limits are narrower: ends what they would refuse. False: it moves on, since
+  // the order to rest cannot be sent.
+  bool end_beyond_limits(RobotEntry& entry);
+  // Adds those in whose names end_right() would end something.
   void add_acting(const RobotEntry& entry, std::set<std::string>& actors) const;
   // Publishes the ends of control that time or a reservation has brought.
   void end_control();

@@ -1,84 +1,10 @@
-// The limits of commands that wait on the robot for their time: steps between them, and the fluid.
-#include <gmock/gmock.h>
-
-#include "server/link/robot_outbox.hpp"
-#include "tests/server/link/timed_fixture.hpp"
+// The limits of commands that wait on the robot for their time: steps between them, and the time at power.
+#include "tests/server/link/limits_fixture.hpp"
 
 namespace server {
 namespace {
 
 using ::testing::HasSubstr;
-
-// Steps of 0.25 m, in auto at 0; in water a duty of 0.5 at most, in oil 10 s at power.
-class TimedLimitsTest : public TimedTest {
- protected:
-  TimedLimitsTest() : TimedTest{envelope()} {
-    EXPECT_TRUE(station.set_fluid("r1", "non_newtonian", {"a", "", 0}));
-    show_setpoint(0);
-  }
-  static config::Envelope envelope() {
-    config::CommandLimits limits, water, oil, honey;
-    limits.setpoint_step_m = water.setpoint_step_m = 0.25;
-    water.duty_max = 0.5;
-    oil.power_s = 10;
-    honey.setpoint_max_m = 0.1;
-    return config::Envelope{limits, {{"water", water}, {"oil", oil}, {"honey", honey}}};
-  }
-  void show_setpoint(float setpoint_m) {
-    auto frame = TestRobot::samples_frame(next_seq_++, 1, robot->robot_now_us(), 0);
-    frame.body.telemetry.mode = rheonaut_MODE_AUTO;
-    frame.body.telemetry.has_setpoint_m = true;
-    frame.body.telemetry.setpoint_m = setpoint_m;
-    robot->send(frame);
-    clock.settle();
-  }
-  static protocol::Command at_power(std::uint32_t lasts_s) {
-    protocol::Command command = rheonaut_Command_init_zero;
-    command.which_action = rheonaut_Command_set_duty_schedule_tag;
-    auto& schedule = command.action.set_duty_schedule;
-    schedule.tick_count = schedule.duty_count = 2;
-    schedule.tick[1] = lasts_s * 100;
-    schedule.duty[0] = 1;
-    return command;
-  }
-  void show_a_second_at_power(std::uint64_t from_us) {
-    for (std::uint64_t shown = 0; shown < 100; shown += 5, next_seq_ += 5) {
-      auto frame = TestRobot::samples_frame(next_seq_, 5, from_us + shown * 10'000, 0);
-      for (float& duty : frame.body.telemetry.duty) duty = 1;
-      robot->send(frame);
-      clock.settle();
-    }
-  }
-  void send_event(protocol::EventKind kind) {
-    protocol::RobotFrame frame = rheonaut_RobotFrame_init_zero;
-    frame.which_body = rheonaut_RobotFrame_event_tag;
-    frame.body.event.kind = kind;
-    frame.body.event.event_robot_time_us = robot->robot_now_us();
-    robot->send(frame);
-    clock.settle();
-  }
-  void show_position(float position_m) {  // in manual
-    auto frame = TestRobot::samples_frame(next_seq_++, 1, robot->robot_now_us(), 0);
-    frame.body.telemetry.position_m[0] = position_m;
-    robot->send(frame);
-    clock.settle();
-  }
-  station::CommandRequest now(protocol::Command command, microseconds time_to_live = 1s) const {
-    station::CommandRequest request = request_of(command, time_to_live);
-    request.actor = "a";
-    return request;
-  }
-  // What speaks against it; empty when it is sent.
-  std::string refusal(station::CommandRequest request) {
-    const std::size_t before = results.size();
-    submit(std::move(request));
-    clock.settle();
-    return results.size() == before ? "" : results.back().error().reason + ": " + results.back().error().detail;
-  }
-
- private:
-  std::uint64_t next_seq_ = 0;
-};
 
 TEST_F(TimedLimitsTest, ASetpointNowIsNotMoreThanAStepFromOneThatWaits) {
   admit(timed(set_setpoint(0.25F), in_ms(5000), "a"));
@@ -122,85 +48,6 @@ TEST_F(TimedLimitsTest, OfAFormerHolderHindersNobody) {
   station::CommandRequest next = now(set_setpoint(-0.25F));
   next.actor = "b";
   EXPECT_EQ(refusal(next), "");
-  EXPECT_EQ(drops(), 1U);
-}
-
-TEST_F(TimedLimitsTest, ItIsDroppedWhenTheLimitsOfTheFluidBecomeNarrower) {
-  const auto sent = admit(timed(set_duty(0.8F), in_ms(5000), "a"));
-  ASSERT_TRUE(station.set_fluid("r1", "water", {"a", "", 0}));
-  clock.settle();
-  EXPECT_EQ(drops(), 1U);
-  robot->acknowledge(sent, rheonaut_COMMAND_RESULT_EXPIRED);
-  accept_last();
-  EXPECT_EQ(latest(sent.command_id).state, station::CommandState::expired);
-  EXPECT_EQ(latest(sent.command_id).reason, "limits_changed");
-
-  admit(timed(set_duty(0.5F), in_ms(3000), "a"));
-  ASSERT_TRUE(station.set_fluid("r1", "non_newtonian", {"a", "", 0}));
-  clock.settle();
-  EXPECT_EQ(drops(), 1U) << "the limits have become wider";
-  ASSERT_TRUE(station.set_fluid("r1", "", {"a", "", 0}));
-  clock.settle();
-  EXPECT_EQ(drops(), 1U) << "the strictest would accept it";
-}
-
-// SAFETY: a motion does not outlive the limits that allowed it.
-TEST_F(TimedLimitsTest, AMotionBeyondTheLimitsOfAnotherFluidEnds) {
-  show_setpoint(0.25F);
-  ASSERT_TRUE(station.set_fluid("r1", "water", {"a", "", 0}));
-  clock.settle();
-  EXPECT_TRUE(robot->commands().empty()) << "0.25 m is within those of water";
-  ASSERT_TRUE(station.set_fluid("r1", "honey", {"a", "", 0}));
-  clock.settle();
-  ASSERT_FALSE(robot->commands().empty());
-  EXPECT_EQ(robot->commands().back().action.set_mode.mode, rheonaut_MODE_MANUAL);
-  EXPECT_EQ(latest_of_kind("set_mode").actor, "station:limits");
-}
-
-TEST_F(TimedLimitsTest, WhereItsEndCannotBeSentTheFluidStays) {
-  show_setpoint(0.25F);
-  while (refusal(now(ping(), 9s)).empty()) {
-  }
-  const auto named = station.set_fluid("r1", "honey", {"a", "", 0});
-  ASSERT_FALSE(named);
-  EXPECT_EQ(named.error().reason, "queue_full");
-  EXPECT_EQ(station.find("r1")->fluid, "non_newtonian");
-}
-
-TEST_F(TimedLimitsTest, WhatTheLinkHasNotTakenIsNotSentWhenTheLimitsBecomeNarrower) {
-  fill_window();
-  submit(now(set_duty(0.8F), 9s));
-  clock.settle();
-  ASSERT_TRUE(station.set_fluid("r1", "water", {"a", "", 0}));
-  clock.settle();
-  EXPECT_EQ(latest_of_kind("set_duty").state, station::CommandState::superseded);
-  EXPECT_EQ(latest_of_kind("set_duty").reason, "limits_changed");
-  submit(now(set_duty(0.5F), 9s));
-  ASSERT_TRUE(station.set_fluid("r1", "non_newtonian", {"a", "", 0}));
-  answer_all();
-  EXPECT_EQ(robot->commands().back().action.set_duty.duty, 0.5F) << "the limits have become wider";
-}
-
-TEST_F(TimedLimitsTest, ItIsDroppedLaterWhenTheLinkWasFullAndNothingIsRenewedBefore) {
-  admit(timed(set_duty(0.8F), in_ms(7000), "a"));
-  for (std::size_t i = 0; i < link::CommandWindow::kMost + link::RobotOutbox::kMaxQueuedCommands; ++i) {
-    submit(ping(), 5s);
-    clock.settle();
-  }
-  ASSERT_TRUE(station.set_fluid("r1", "water", {"a", "", 0}));
-  protocol::Command renewal = rheonaut_Command_init_zero;
-  renewal.which_action = rheonaut_Command_renew_lease_tag;
-  EXPECT_THAT(refusal(now(renewal)), HasSubstr("queue_full"));
-  for (std::size_t i = 1; i < robot->commands().size(); ++i) {
-    robot->acknowledge(robot->commands()[i], rheonaut_COMMAND_RESULT_ACCEPTED);
-    clock.settle();
-    if (i == 5) submit(now(renewal));
-  }
-  const auto sent = kinds();
-  const auto drop = std::ranges::find(sent, std::string{"drop_timed"});
-  const auto renewed = std::ranges::find(sent, std::string{"renew_lease"});
-  ASSERT_NE(renewed, sent.end());
-  EXPECT_LT(drop - sent.begin(), renewed - sent.begin());
   EXPECT_EQ(drops(), 1U);
 }
 
