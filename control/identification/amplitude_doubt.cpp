@@ -132,8 +132,8 @@ MatrixXd beyond(const Qr& qr, const MatrixXd& columns) {
 
 }  // namespace
 
-std::optional<AmplitudeEvidence> amplitude_evidence(OutputErrorSearch& search, const Recording& recording,
-                                                    const Fit& fit, const SearchPoint& point) {
+std::optional<ScoreEvidence> amplitude_evidence(OutputErrorSearch& search, const Recording& recording, const Fit& fit,
+                                                const SearchPoint& point) {
   const bool is_rounding = fit.fit_percent >= kFitOfRounding;
   if (is_rounding || (fit.end != SearchEnd::converged && fit.end != SearchEnd::iteration_limit) || search.limit().end())
     return std::nullopt;
@@ -164,13 +164,20 @@ std::optional<AmplitudeEvidence> amplitude_evidence(OutputErrorSearch& search, c
   const double explained = residual.squaredNorm() - rest.squaredNorm();
   const double freedom = static_cast<double>(values - by_linear.rank() - by_changing.rank());
   if (!(freedom > 0)) return std::nullopt;
-  return AmplitudeEvidence{explained / residual.squaredNorm(),
-                           explained / rest.squaredNorm() * freedom / static_cast<double>(by_changing.rank())};
+  const double share = explained / residual.squaredNorm();
+  return ScoreEvidence{
+      .share = share,
+      .f = explained / rest.squaredNorm() * freedom / static_cast<double>(by_changing.rank()),
+      .widening = std::sqrt(1 + share * static_cast<double>(values) / std::max(1, fit.free_parameters))};
 }
 
-std::vector<std::string> amplitude_doubts(const std::optional<AmplitudeEvidence>& evidence, const Recording& recording,
+bool changes_with_amplitude(const std::optional<ScoreEvidence>& evidence) {
+  return evidence && evidence->f > kDoubtfulF && evidence->share >= kDoubtfulShare;
+}
+
+std::vector<std::string> amplitude_doubts(const std::optional<ScoreEvidence>& evidence, const Recording& recording,
                                           bool order_is_forced, const std::string& structure_option) {
-  if (!evidence || !(evidence->f > kDoubtfulF && evidence->share >= kDoubtfulShare)) return {};
+  if (!changes_with_amplitude(evidence)) return {};
   double largest = 0;
   for (const double duty : recording.duty) largest = std::max(largest, std::abs(duty));
   std::ostringstream text;

@@ -24,11 +24,13 @@
 namespace control {
 
 // None: the residuals are rounding, or there is nothing to compare.
-std::optional<AmplitudeEvidence> amplitude_evidence(OutputErrorSearch& search, const Recording& recording,
-                                                    const Fit& fit, const SearchPoint& point);
+std::optional<ScoreEvidence> amplitude_evidence(OutputErrorSearch& search, const Recording& recording, const Fit& fit,
+                                                const SearchPoint& point);
+
+bool changes_with_amplitude(const std::optional<ScoreEvidence>& evidence);
 
 // order_is_forced: the structure was given, and it is not the fractional one; structure_option: how, or empty.
-std::vector<std::string> amplitude_doubts(const std::optional<AmplitudeEvidence>& evidence, const Recording& recording,
+std::vector<std::string> amplitude_doubts(const std::optional<ScoreEvidence>& evidence, const Recording& recording,
                                           bool order_is_forced, const std::string& structure_option = {});
 
 }  // namespace control

@@ -104,6 +104,7 @@ void add_whiteness(const OutputErrorSearch& search, const std::vector<Eigen::Vec
     p_value_of(channels[c], fit) = p;
     fit.whiteness_p_value = std::min(fit.whiteness_p_value, p);
     if (!(fit.fit_percent < kFitOfRounding)) continue;
+    fit.colour_factor = std::max(fit.colour_factor, std::sqrt(samples_per_independent_one(counted)));
     fit.drift_factor = std::max(fit.drift_factor, drift_factor(counted, values_in_2_s(counted.size(), duration_s)));
   }
   fit.residuals_are_white = fit.whiteness_p_value >= kWhite;

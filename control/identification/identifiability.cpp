@@ -20,9 +20,7 @@ constexpr double kWorthPlanning = 2;       // times better
 constexpr double kPlanDurationS = 60, kPlanBitS = 0.2;
 constexpr double kPlanMostSamples = 20000;
 
-bool is_order(std::size_t parameter) { return parameter >= 3; }
-
-std::array<double, kParameters> values(const FractionalModel& m) { return {m.kp, m.b1, m.b2, m.alpha, m.beta}; }
+double lower_bound_of(std::size_t order) { return order == 3 ? 1 : 0; }  // (4) of identify.hpp
 
 bool is_free(Structure structure, std::size_t parameter) {
   if (structure == Structure::fractional) return true;
@@ -91,7 +89,7 @@ std::string better_experiment(const Recording& recording, const Fit& fit, bool f
     const auto& sigma = expected.one_sigma[i];
     if (!sigma || !std::isfinite(*sigma)) continue;
     is_better = is_better || !fit.one_sigma[i] || !(*fit.one_sigma[i] < kWorthPlanning * *sigma);
-    words.push_back(sigma_words(i, sigma, values(fit.model)[i]));
+    words.push_back(sigma_words(i, sigma, parameters_of(fit.model)[i]));
   }
   if (!is_better) {
     return "a ±1 PRBS of 60 s with 0.2 s bits would not do much better: make the run longer or the motion larger, or "
@@ -102,18 +100,13 @@ std::string better_experiment(const Recording& recording, const Fit& fit, bool f
 
 void add_undetermined(const Recording& recording, const Fit& fit, bool fits_offset, std::size_t runs,
                       std::vector<std::string>& warnings) {
-  const auto value = values(fit.model);
-  std::vector<std::size_t> doubtful;
-  std::vector<std::string> names, sigmas;
-  for (std::size_t i = 0; i < kParameters; ++i) {
-    if (!is_free(fit.structure, i)) continue;
-    const double unit = is_order(i) ? 1 : value[i];
-    if (fit.one_sigma[i] && *fit.one_sigma[i] <= kLargestSigma[i] * unit) continue;
-    doubtful.push_back(i);
-    names.emplace_back(kParameterNames[i]);
-    sigmas.push_back(sigma_words(i, fit.one_sigma[i], value[i]));
-  }
+  const std::vector<std::size_t> doubtful = undetermined_parameters(fit);
   if (doubtful.empty()) return;
+  std::vector<std::string> names, sigmas;
+  for (const std::size_t i : doubtful) {
+    names.emplace_back(kParameterNames[i]);
+    sigmas.push_back(sigma_words(i, fit.one_sigma[i], parameters_of(fit.model)[i]));
+  }
   const std::string subject = runs == 1 ? "this run cannot" : "these runs together cannot";
   warnings.push_back(subject + " determine " + enumerated(names) + ": one sigma is " + enumerated(sigmas) +
                      " (trust at most 0.1 times kp, 0.5 times b1 or b2, 0.1 for the orders); compare responses, not "
@@ -141,22 +134,19 @@ bool dead_time_is_at_its_limit(const Fit& fit, const IdentificationOptions& opti
 }
 
 void add_at_bounds(const Fit& fit, const IdentificationOptions& options, std::vector<std::string>& warnings) {
-  if (fit.structure != Structure::fractional) return;
   const char* meaning = dead_time_is_at_its_limit(fit, options)
                             ? "probably because the dead time is at its limit; raise that first"
                         : !describes_run(fit) ? "the model does not describe the run, so this order means nothing"
                                               : "the data do not need this fractional order, or do not show it";
-  const auto add = [&](const char* name, double order, double lower, double upper) {
-    if (order > lower + kNearBound && order < upper - kNearBound) return;
+  for (const std::size_t i : parameters_at_bound(fit)) {
+    const double order = parameters_of(fit.model)[i], lower = lower_bound_of(i), upper = lower + 1;
     std::ostringstream text;
     text.precision(6);
-    text << name << " = " << order << " lies at its bound " << (order < (lower + upper) / 2 ? lower : upper)
-         << " (allowed: " << lower << " to " << upper << "): " << meaning
-         << "; its sigma means little there, so compare with the integer structures by AIC";
+    text << kParameterNames[i] << " = " << order << " lies at its bound "
+         << (order < (lower + upper) / 2 ? lower : upper) << " (allowed: " << lower << " to " << upper
+         << "): " << meaning << "; its sigma means little there, so compare with the integer structures by AIC";
     warnings.push_back(text.str());
-  };
-  add("alpha", fit.model.alpha, 1, 2);
-  add("beta", fit.model.beta, 0, 1);
+  }
 }
 
 bool has_constant_duty(const Recording& recording) {
@@ -171,6 +161,31 @@ void add_constant_duty(const Recording& recording, std::vector<std::string>& war
 }
 
 }  // namespace
+
+bool is_order(std::size_t parameter) { return parameter >= 3; }
+
+std::array<double, kParameters> parameters_of(const FractionalModel& m) { return {m.kp, m.b1, m.b2, m.alpha, m.beta}; }
+
+std::vector<std::size_t> undetermined_parameters(const Fit& fit) {
+  std::vector<std::size_t> undetermined;
+  if (fit.starts == 0) return undetermined;
+  for (std::size_t i = 0; i < kParameters; ++i) {
+    const double unit = is_order(i) ? 1 : parameters_of(fit.model)[i];
+    const bool is_determined = fit.one_sigma[i] && *fit.one_sigma[i] <= kLargestSigma[i] * unit;
+    if (is_free(fit.structure, i) && !is_determined) undetermined.push_back(i);
+  }
+  return undetermined;
+}
+
+std::vector<std::size_t> parameters_at_bound(const Fit& fit) {
+  std::vector<std::size_t> found;
+  if (fit.structure != Structure::fractional || fit.starts == 0) return found;
+  for (const std::size_t i : {std::size_t{3}, std::size_t{4}}) {
+    const double beyond_lower = parameters_of(fit.model)[i] - lower_bound_of(i);
+    if (beyond_lower <= kNearBound || beyond_lower >= 1 - kNearBound) found.push_back(i);
+  }
+  return found;
+}
 
 bool describes_run(const Fit& fit) {
   return fit.fit_percent >= kPoorFitPercent || (fit.sensor && fit.residuals_are_white);

@@ -6,6 +6,8 @@
 // Errors: none thrown.
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <string>
 #include <vector>
 
@@ -21,6 +23,12 @@ std::vector<std::string> search_doubts(const Fit& fit, const IdentificationOptio
 // Of several runs that were fitted together: the fit of the longest, with the sigmas of all.
 std::vector<std::string> identifiability_warnings(const Recording& recording, const Fit& fit,
                                                   const IdentificationOptions& options, std::size_t runs = 1);
+
+// By their place in kParameterNames.
+bool is_order(std::size_t parameter);
+std::array<double, kParameters> parameters_of(const FractionalModel& model);
+std::vector<std::size_t> undetermined_parameters(const Fit& fit);
+std::vector<std::size_t> parameters_at_bound(const Fit& fit);
 
 // A fit that is poor in percent describes the run nevertheless where only the accelerometer's white noise is left.
 bool describes_run(const Fit& fit);

@@ -13,6 +13,7 @@
 #include "control/identification/second_opinions.hpp"
 #include "control/identification/structure_choice.hpp"
 #include "control/identification/unit_doubts.hpp"
+#include "control/search/missed_ticks.hpp"
 #include "control/search/output_error_search.hpp"
 
 namespace control {
@@ -67,6 +68,7 @@ Identification identify(const Recording& recording, const IdentificationOptions&
   add_verdict(result.compared, 1, warnings);
   add_rival(result.compared, warnings);
   if (search.limit().has_passed()) return out_of_time();  // a doubt may be missing
+  result.doubts = doubts_about(result.best, result.amplitude, share_used({&recording, 1}));
   return result;
 }
 

@@ -14,6 +14,7 @@
 #include "control/identification/second_opinions.hpp"
 #include "control/identification/structure_choice.hpp"
 #include "control/identification/unit_doubts.hpp"
+#include "control/search/missed_ticks.hpp"
 
 namespace control {
 namespace {
@@ -46,7 +47,7 @@ void check_together(std::span<const Recording> recordings, const IdentificationO
 // What concerns one run only.
 std::vector<std::string> doubts_of(JointSearch& search, std::size_t i, const Recording& recording,
                                    const IdentificationOptions& options, const Fit& fit,
-                                   const std::optional<AmplitudeEvidence>& amplitude) {
+                                   const std::optional<ScoreEvidence>& amplitude) {
   std::vector<std::string> warnings;
   append(warnings, unit_doubts(recording));
   append(warnings, lag_doubts(recording, options, fit));
@@ -94,12 +95,17 @@ Identification identify_together(std::span<const Recording> recordings, const Id
   std::vector<std::string>& warnings = result.warnings;
   append(warnings, search_doubts(result.best, options));
   append(warnings, untried_structures(result.compared));
-  append(warnings, disagreement_doubts(search, best, found[best]));
+  const auto disagreeing = disagreement(search, best, found[best]);
+  if (disagreeing) warnings.push_back(disagreement_in_words(*disagreeing));
   const std::size_t longest = search.longest();
   append(warnings, identifiability_warnings(recordings[longest], result.runs[longest].fit, options, recordings.size()));
   add_verdict(result.compared, recordings.size(), warnings);
   add_rival(result.compared, warnings);
   if (search.is_out_of_time()) return out_of_time();  // a doubt may be missing
+  result.doubts = doubts_about(result.best, result.amplitude, share_used(recordings));
+  if (disagreeing) {
+    result.doubts.push_back({DoubtCode::runs_disagree, disagreeing->share, {}, disagreeing->widening});
+  }
   return result;
 }
 

@@ -131,6 +131,7 @@ void add_quality(JointSearch& search, const JointResult& found, JointFit& fit) {
     motion += n / std::max(1e-300, ratio * ratio);
     least = std::min(least, run.whiteness_p_value);
     fit.all.drift_factor = std::max(fit.all.drift_factor, run.drift_factor);
+    fit.all.colour_factor = std::max(fit.all.colour_factor, run.colour_factor);
     fit.all.sse += run.sse;
     fit.all.absolute_error += run.absolute_error;
     if (search.of_run(i).channels().front() != search.of_run(0).channels().front()) continue;
@@ -191,27 +192,31 @@ JointFit joint_summary(JointSearch& search, std::span<const Recording> recording
   return fit;
 }
 
-std::vector<std::string> disagreement_doubts(JointSearch& search, Structure structure, const JointResult& found) {
-  if (found.starts == 0 || found.end != SearchEnd::converged) return {};
+std::optional<ScoreEvidence> disagreement(JointSearch& search, Structure structure, const JointResult& found) {
+  if (found.starts == 0 || found.end != SearchEnd::converged) return std::nullopt;
   const JointColumns columns = search.columns(structure);
   double explained = 0, all = 0, values = 0;
   for (const Block& block : blocks(search, Cost::least_squares, structure, found)) {
-    if (!block.slopes.allFinite() || !block.residual.allFinite()) return {};
+    if (!block.slopes.allFinite() || !block.residual.allFinite()) return std::nullopt;
     explained += explained_of(block);
     all += block.residual.squaredNorm();
     values += block.values;
   }
   const double more = columns.common * static_cast<double>(search.runs() - 1);
   const double freedom = values - columns.all - more, share = explained / all;
-  if (!(freedom > 0) || !(share < 1)) return {};
+  if (!(freedom > 0) || !(share < 1)) return std::nullopt;
   const double f = share / (1 - share) * freedom / more;  // (4)
-  if (!(f > kDoubtfulF && share >= kDoubtfulShare)) return {};
+  if (!(f > kDoubtfulF && share >= kDoubtfulShare)) return std::nullopt;
+  return ScoreEvidence{share, f, std::sqrt(1 + share * values / columns.all)};
+}
+
+std::string disagreement_in_words(const ScoreEvidence& evidence) {
   std::ostringstream text;
   text.precision(3);
-  text << "the runs do not agree on one model: parameters of their own would explain " << 100 * share
-       << " % of what the common ones leave (F = " << f << ", above " << kDoubtfulF
+  text << "the runs do not agree on one model: parameters of their own would explain " << 100 * evidence.share
+       << " % of what the common ones leave (F = " << evidence.f << ", above " << kDoubtfulF
        << "); fit each run by itself, and look for another fluid, another amplitude or a robot that has changed";
-  return {text.str()};
+  return text.str();
 }
 
 }  // namespace control

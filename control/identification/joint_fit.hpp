@@ -26,7 +26,8 @@ struct JointFit {
 JointFit joint_summary(JointSearch& search, std::span<const Recording> recordings, Cost cost, Structure structure,
                        const JointResult& found);
 
-// That the runs do not agree on one model, by (4).
-std::vector<std::string> disagreement_doubts(JointSearch& search, Structure structure, const JointResult& found);
+// That the runs do not agree on one model, by (4); none: they do.
+std::optional<ScoreEvidence> disagreement(JointSearch& search, Structure structure, const JointResult& found);
+std::string disagreement_in_words(const ScoreEvidence& evidence);
 
 }  // namespace control

@@ -112,6 +112,9 @@ struct Fit {
   // The largest of the channels, (8) of fit_statistics.hpp over 2 s and longer: by how much a slow drift makes sigmas
   // too small, which the whiteness at short lags does not show; 1: none is seen.
   double drift_factor = 1;
+  // The largest of the channels, √(n/n_effective) of (7) there: by how much residuals that are not white make sigmas
+  // too small.
+  double colour_factor = 1;
   std::optional<double> position_whiteness_p_value, velocity_whiteness_p_value, acceleration_whiteness_p_value;
   SearchEnd end = SearchEnd::converged;
   // iterations: of the best start; starts: made, 0 if the structure was never searched; agree: with the best cost
@@ -123,10 +126,12 @@ struct Fit {
   std::optional<SensorFit> sensor;                 // of a fit of the acceleration
 };
 
-// Of parameters that change with amplitude: amplitude_doubt.hpp.
-struct AmplitudeEvidence {
-  double share = 0;  // of the squares of the residuals, that they explain
-  double f = 0;      // about 1 where nothing changes
+// Of a score test: what further parameters would explain. Ones that change with amplitude (amplitude_doubt.hpp), or of
+// each run its own (joint_fit.hpp).
+struct ScoreEvidence {
+  double share = 0;     // of the squares of the residuals, that they explain
+  double f = 0;         // about 1 where nothing changes
+  double widening = 1;  // (1) of doubts.hpp
 };
 
 }  // namespace control

@@ -72,6 +72,16 @@ std::vector<bool> uncounted_ticks(const Recording& recording) {
   return uncounted;
 }
 
+double share_used(std::span<const Recording> recordings) {
+  std::size_t ticks = 0, uncounted = 0;
+  for (const Recording& recording : recordings) {
+    const std::vector<bool> left_out = uncounted_ticks(recording);
+    ticks += recording.duty.size();
+    uncounted += static_cast<std::size_t>(std::ranges::count(left_out, true));
+  }
+  return ticks == 0 ? 1 : 1 - static_cast<double>(uncounted) / static_cast<double>(ticks);
+}
+
 std::string missed_ticks_in_words(const Recording& recording) {
   const std::size_t missed = missed_ticks(recording), ticks = recording.is_missed.size();
   if (missed == 0) return {};

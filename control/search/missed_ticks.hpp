@@ -30,6 +30,8 @@ std::size_t missed_ticks(const Recording& recording);
 // Ticks whose values do not count in a fit: missed, or left out. Empty: all count.
 std::vector<bool> uncounted_ticks(const Recording& recording);
 
+double share_used(std::span<const Recording> recordings);  // of their ticks, that count
+
 // A warning for the reader of the fit; empty: none was missed.
 std::string missed_ticks_in_words(const Recording& recording);
 

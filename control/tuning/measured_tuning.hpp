@@ -1,7 +1,7 @@
 // Tunes the fractional PD controller to a plant that was measured at the crossover, without a model: (24) to (26) ask
 // for modulus, phase and phase slope there, and for nothing else.
 //
-//   θ = -π + φ_m - arg P,  R = -d arg P/d ln ω,  |P|     measured: control/identification/three_tones
+//   θ = -π + φ_m - arg P,  R = -d arg P/d ln ω,  |P|     measured: control/tuning/three_tones
 //   then (3) to (6) of tune.hpp
 //
 // What the loop does elsewhere is known at the other two tones only: a design is refused if the loop's gain is not
@@ -14,8 +14,8 @@
 #include <optional>
 #include <string>
 
-#include "control/identification/three_tones.hpp"
 #include "control/tuning/design.hpp"
+#include "control/tuning/three_tones.hpp"
 
 namespace control {
 

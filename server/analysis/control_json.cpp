@@ -134,6 +134,10 @@ Result<control::FractionalModel> model_from(const json& given) {
 
 Result<std::optional<control::ExpectedUncertainty>> uncertainty_from(const json& fit) {
   if (!fit.is_object() || !fit.contains("one_sigma")) return std::nullopt;
+  const auto doubted = doubts_from(fit);
+  if (!doubted) return std::unexpected{doubted.error()};
+  const std::optional<double> widening = control::widening(doubted->doubts);
+  if (!widening) return std::nullopt;
   try {
     control::ExpectedUncertainty known;
     const std::string structure = fit.at("structure");
@@ -149,6 +153,7 @@ Result<std::optional<control::ExpectedUncertainty>> uncertainty_from(const json&
         return fail(ErrorCode::invalid, fmt::format("one_sigma of {} is {}, it must not be negative",
                                                     control::kParameterNames[i], *known.one_sigma[i]));
       }
+      *known.one_sigma[i] *= *widening;
     }
     known.correlation = fit.at("correlation").get<decltype(known.correlation)>();
     return known;

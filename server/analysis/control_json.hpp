@@ -7,7 +7,10 @@
 #pragma once
 
 #include <nlohmann/json.hpp>
+#include <optional>
+#include <span>
 #include <string>
+#include <vector>
 
 #include "control/discretisation/discretise.hpp"
 #include "control/discretisation/estimator_model.hpp"
@@ -27,14 +30,28 @@ using OrderedJson = nlohmann::ordered_json;  // keys in the order in which a per
 // bad_request for a wrong shape, invalid for a value out of range; the detail names key, value and what is allowed.
 Result<control::FractionalModel> model_from(const nlohmann::json& value);
 Result<control::FopdController> controller_from(const nlohmann::json& value);
-// How well an identification knows the parameters of its model. None where it does not know one of them, and for a
-// model that was written by hand. The dead time is taken as known.
+// How well an identification knows the parameters of its model, with what it doubts counted: each sigma times the
+// widening of doubts.hpp. None where it does not know one of them, or nobody knows the widening, and for a model that
+// was written by hand. The dead time is taken as known.
 Result<std::optional<control::ExpectedUncertainty>> uncertainty_from(const nlohmann::json& fit);
+
+// What an identification doubts of its model.
+struct ModelDoubts {
+  bool is_of_fit = false;  // else the model was written by hand
+  bool are_known = false;  // false: by hand, or a version that did not say has made it
+  std::vector<control::Doubt> doubts;
+};
+Result<ModelDoubts> doubts_from(const nlohmann::json& fit);
+// In one line, for what is computed from the model; empty: nothing is doubted that widens it.
+std::string doubts_in_words(const ModelDoubts& known);
+// The grave ones in one line; empty: none is.
+std::string grave_doubts_in_words(const ModelDoubts& known);
 
 const char* text(control::Structure value);
 const char* text(control::Cost value);
 const char* text(control::SearchEnd value);
 const char* text(control::DiscretisationMethod value);
+const char* text(control::DoubtCode value);
 
 OrderedJson json_of(const control::FractionalModel& model);
 OrderedJson json_of(const control::FopdController& controller);
@@ -47,6 +64,7 @@ OrderedJson json_of(const control::TunedController& tuned);
 OrderedJson json_of(const control::TuningResult& result);
 OrderedJson json_of(const control::EstimatorModel& model);  // without parameters if it is refused
 OrderedJson json_of(const control::Fit& fit);
+OrderedJson json_of(std::span<const control::Doubt> doubts);  // a list; `text` of each is for people
 OrderedJson json_of(const control::Identification& identification);
 OrderedJson json_of(const control::ExpectedUncertainty& uncertainty);
 OrderedJson json_of(const control::ParallelSections& sections);

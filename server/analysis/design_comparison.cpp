@@ -10,6 +10,8 @@
 #include <optional>
 #include <vector>
 
+#include "server/analysis/optional_json.hpp"
+
 namespace server::analysis {
 namespace {
 
@@ -45,8 +47,6 @@ Result<Compared> parameters_of(const storage::Design& design) {
   parameters.push_back({"dead_time_s", model.dead_time_s, {}});
   return Compared{std::move(parameters), *uncertainty};
 }
-
-OrderedJson or_null(std::optional<double> value) { return value ? OrderedJson(*value) : OrderedJson(nullptr); }
 
 std::optional<double> relative_difference(double value, double first) {
   if (value == first) return 0;

@@ -85,6 +85,7 @@ OrderedJson json_of(const control::Fit& fit) {
           {"residuals_are_white", fit.residuals_are_white},
           {"whiteness_p_value", fit.whiteness_p_value},
           {"drift_factor", fit.drift_factor},
+          {"colour_factor", fit.colour_factor},
           {"position_whiteness_p_value", or_null(fit.position_whiteness_p_value)},
           {"velocity_whiteness_p_value", or_null(fit.velocity_whiteness_p_value)},
           {"acceleration_whiteness_p_value", or_null(fit.acceleration_whiteness_p_value)},
@@ -100,6 +101,8 @@ OrderedJson json_of(const control::Fit& fit) {
 OrderedJson json_of(const control::Identification& identification) {
   OrderedJson out = json_of(identification.best);
   out["warnings"] = identification.warnings;
+  out["doubts"] = json_of(identification.doubts);
+  out["widening"] = or_null(control::widening(identification.doubts));
   out["compared"] = OrderedJson::array();
   for (const control::Fit& fit : identification.compared) out["compared"].push_back(json_of(fit));
   return out;

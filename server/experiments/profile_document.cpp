@@ -14,7 +14,7 @@
 #include "base/json_table.hpp"
 #include "base/toml_text.hpp"
 #include "base/whole_file.hpp"
-#include "control/identification/three_tones.hpp"
+#include "control/tuning/three_tones.hpp"
 #include "server/experiments/duty_signals.hpp"
 #include "server/experiments/time_line.hpp"
 #include "server/experiments/until_rules.hpp"

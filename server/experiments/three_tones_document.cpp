@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "control/identification/three_tones.hpp"
+#include "control/tuning/three_tones.hpp"
 
 namespace server::experiments {
 

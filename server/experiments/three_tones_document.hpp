@@ -1,4 +1,4 @@
-// The profile of an experiment with three tones, for a controller without a model (control/identification/three_tones).
+// The profile of an experiment with three tones, for a controller without a model (control/tuning/three_tones).
 #pragma once
 
 #include <nlohmann/json.hpp>

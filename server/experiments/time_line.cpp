@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "control/identification/three_tones.hpp"
+#include "control/tuning/three_tones.hpp"
 #include "server/experiments/duty_signals.hpp"
 
 namespace server::experiments {

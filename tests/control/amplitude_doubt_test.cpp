@@ -33,7 +33,7 @@ Recording dragged_run(double dead_time_s) {
 }
 
 // Of the true fluid, as if it had been found.
-AmplitudeEvidence evidence_of(const Recording& run, double dead_time_s) {
+ScoreEvidence evidence_of(const Recording& run, double dead_time_s) {
   IdentificationOptions options = unhurried_options();
   options.longest_dead_time_s = 1;
   OutputErrorSearch search(run, options);
@@ -45,9 +45,21 @@ AmplitudeEvidence evidence_of(const Recording& run, double dead_time_s) {
 }
 
 TEST(AmplitudeDoubt, ADragThatFollowsTheSpeedIsSeenBehindADeadTime) {
-  const AmplitudeEvidence prompt = evidence_of(dragged_run(0), 0), late = evidence_of(dragged_run(0.3), 0.3);
+  const ScoreEvidence prompt = evidence_of(dragged_run(0), 0), late = evidence_of(dragged_run(0.3), 0.3);
   EXPECT_GT(prompt.share, 0.99);
   EXPECT_GT(late.share, 0.99);
+}
+
+TEST(AmplitudeDoubt, ItIsGraveByWhatItExplains) {
+  IdentificationOptions options = unhurried_options();
+  options.further_starts = 0;
+  const Identification found = identify(dragged_run(0), options);
+  const auto doubt = std::ranges::find(found.doubts, DoubtCode::no_linear_model_over_amplitude, &Doubt::code);
+  ASSERT_NE(doubt, found.doubts.end());
+  EXPECT_EQ(doubt->value, found.amplitude->share);
+  const double values_per_parameter = 2000.0 / found.best.free_parameters;
+  EXPECT_NEAR(*doubt->widening, std::sqrt(1 + *doubt->value * values_per_parameter), 0.1);
+  EXPECT_TRUE(is_grave(*doubt));
 }
 
 // A fluid of four terms whose acceleration is fitted by two.

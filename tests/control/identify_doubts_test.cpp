@@ -46,6 +46,7 @@ std::vector<std::string> warnings_of(const Recording& run,
 
 TEST(IdentifyDoubts, AreNoneForACleanRun) {
   EXPECT_THAT(warnings_of(lag_run()), IsEmpty());
+  EXPECT_EQ(identify(lag_run(), one_start(Structure::first_order)).doubts.size(), 0U);
   EXPECT_THAT(warnings_of(two_channel_run()), IsEmpty());
   IdentificationOptions options = one_start(Structure::first_order);
   options.fits_offset = false;
@@ -198,6 +199,45 @@ TEST(IdentifyDoubts, ADeadTimeAtItsLimitComesFirst) {
     EXPECT_THAT(warnings.front(), HasSubstr("lies at the longest that was allowed, 0.05 s"));
     EXPECT_THAT(warnings, Not(Contains(HasSubstr("do not need this fractional order"))));
   }
+}
+
+const Doubt* doubt_in(const Identification& found, DoubtCode code) {
+  const auto doubt = std::ranges::find(found.doubts, code, &Doubt::code);
+  return doubt == found.doubts.end() ? nullptr : &*doubt;
+}
+
+TEST(IdentifyDoubts, ASearchThatALimitEndedHasNoWidthThatAnybodyKnows) {
+  IdentificationOptions options = one_start(Structure::fractional);
+  options.iteration_limit = 2;
+  const Identification found = identify(lag_run(), options);
+  const Doubt* doubt = doubt_in(found, DoubtCode::search_not_converged);
+  ASSERT_NE(doubt, nullptr);
+  EXPECT_EQ(doubt->value, 2);
+  EXPECT_TRUE(is_grave(*doubt));
+  EXPECT_EQ(widening(found.doubts), std::nullopt);
+}
+
+// Its size counts: the same p of a shorter colour would be no grave one.
+TEST(IdentifyDoubts, ResidualsThatAreAlikeWidenByHowManyAre) {
+  Recording run = lag_run(0);
+  std::vector<double> noise(run.position_m.size());
+  add_noise(noise, 1e-4, 4);
+  double slow = 0;
+  for (std::size_t k = 0; k < noise.size(); ++k) run.position_m[k] += slow = 0.95 * slow + noise[k];
+  const Identification found = identify(run, one_start(Structure::first_order));
+  const Doubt* doubt = doubt_in(found, DoubtCode::residuals_not_white);
+  ASSERT_NE(doubt, nullptr);
+  EXPECT_NEAR(*doubt->widening, std::sqrt((1 + 0.95) / (1 - 0.95)), 2.5) << "of an autoregression of the first order";
+  EXPECT_TRUE(is_grave(*doubt));
+  EXPECT_GE(*widening(found.doubts), *doubt->widening);
+}
+
+TEST(IdentifyDoubts, CombineAsIndependentOnesDo) {
+  EXPECT_EQ(widening({}), 1);
+  const std::vector<Doubt> doubts{{DoubtCode::residuals_drift, 2, {}, 2}, {DoubtCode::residuals_not_white, 3, {}, 3}};
+  EXPECT_DOUBLE_EQ(*widening(doubts), std::sqrt(1 + 3 + 8));
+  EXPECT_FALSE(is_grave(doubts[0])) << "it just doubles";
+  EXPECT_TRUE(is_grave(doubts[1]));
 }
 
 TEST(IdentifyDoubts, ResidualsThatAreNoNumbersAreNotWhite) {

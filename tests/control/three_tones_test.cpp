@@ -1,6 +1,6 @@
 // The plant at one frequency, from an accelerometer in a closed loop, and the controller that follows from it: ten
 // fluids, the default sensor with its noise, bias, quantum and clock.
-#include "control/identification/three_tones.hpp"
+#include "control/tuning/three_tones.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

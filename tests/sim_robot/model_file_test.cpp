@@ -72,7 +72,7 @@ TEST(ModelFile, AFileThatIsNotThereIsSaidByItsName) {
     load_model("/nowhere/model.json");
     FAIL();
   } catch (const std::invalid_argument& error) {
-    EXPECT_STREQ(error.what(), "/nowhere/model.json: cannot be read");
+    EXPECT_STREQ(error.what(), "/nowhere/model.json: cannot be read: No such file or directory");
   }
 }
 

@@ -21,4 +21,9 @@ void add_margin_sigmas(const control::FractionalModel& plant, const control::Tun
   achieved["crossover_sigma_rad_s"] = sigmas ? OrderedJson(sigmas->gain_crossover_rad_s) : OrderedJson{};
 }
 
+void add_plant_doubts(const ModelDoubts& known, OrderedJson& answer) {
+  answer["plant_doubts"] = known.are_known ? json_of(std::span{known.doubts}) : OrderedJson{};
+  answer["plant_doubts_text"] = doubts_in_words(known);
+}
+
 }  // namespace server::analysis

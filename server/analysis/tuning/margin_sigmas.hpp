@@ -19,5 +19,7 @@ std::optional<control::MarginUncertainty> margin_sigmas(const control::Fractiona
 // Adds `phase_margin_sigma_deg` and `crossover_sigma_rad_s` to `achieved` of a tuning's answer, null where not known.
 void add_margin_sigmas(const control::FractionalModel& plant, const control::TuningResult& result,
                        const PlantUncertainty& of_plant, OrderedJson& answer);
+// Adds `plant_doubts`, null where they are not known, and `plant_doubts_text`, a line for people.
+void add_plant_doubts(const ModelDoubts& known, OrderedJson& answer);
 
 }  // namespace server::analysis

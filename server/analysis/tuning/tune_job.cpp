@@ -37,6 +37,7 @@ std::string compute_tuning(const TuneRequest& request, storage::JobRun& run) {
   const control::TuningResult result = control::tune(request.plant, spec);
   OrderedJson answer = tuning_json(request.plant, spec, result, control::sound_phase_margins(request.plant, spec));
   add_margin_sigmas(request.plant, result, request.plant_uncertainty, answer);
+  add_plant_doubts(request.plant_doubts, answer);
   answer["plant_source"] = request.plant_source;
   if (result.tuned) add_controller(request, result.tuned->controller, run, answer);
   return answer.dump();

@@ -20,7 +20,8 @@ namespace server::analysis {
 
 struct TuneRequest {
   control::FractionalModel plant;
-  PlantUncertainty plant_uncertainty;
+  PlantUncertainty plant_uncertainty;  // with the doubts counted
+  ModelDoubts plant_doubts;
   OrderedJson plant_source;  // {"model_id": …}, {"fluid": …} or {"given": true}
   control::TuningSpec spec;
   double period_s = 0.01;

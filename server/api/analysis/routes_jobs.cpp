@@ -72,6 +72,7 @@ struct FoundPlant {
   control::FractionalModel model;
   analysis::OrderedJson source;
   analysis::PlantUncertainty uncertainty = {};
+  analysis::ModelDoubts doubts = {};
 };
 
 Result<FoundPlant> plant_of_design(const Result<storage::Design>& design) {
@@ -85,13 +86,18 @@ Result<FoundPlant> plant_of_design(const Result<storage::Design>& design) {
   if (!model) return std::unexpected{model.error()};
   const auto uncertainty = analysis::uncertainty_from(document);
   if (!uncertainty) return std::unexpected{uncertainty.error()};
-  return FoundPlant{*model, {{"model_id", design->id}}, *uncertainty};
+  const auto doubts = analysis::doubts_from(document);
+  if (!doubts) return std::unexpected{doubts.error()};
+  return FoundPlant{*model, {{"model_id", design->id}}, *uncertainty, *doubts};
 }
 
 Result<FoundPlant> plant_of_fluid(const station::FluidModelList& models, const std::string& fluid) {
   const station::FluidModel* in_force = models.find(fluid);
   const auto model = in_force == nullptr ? std::nullopt : plant_of(*in_force);
-  if (model) return FoundPlant{*model, {{"fluid", fluid}}};
+  if (model) {
+    const auto doubts = analysis::doubts_from(json::parse(in_force->document, nullptr, false));
+    return FoundPlant{*model, {{"fluid", fluid}}, {}, doubts.value_or(analysis::ModelDoubts{})};
+  }
   return fail(ErrorCode::not_found,
               fmt::format("the fluid '{}' has no model with its plant (POST …/fluids/{{fluid}}/model)", fluid),
               "no_model");
@@ -99,7 +105,7 @@ Result<FoundPlant> plant_of_fluid(const station::FluidModelList& models, const s
 
 boost::asio::awaitable<Result<FoundPlant>> find_plant(JobRoutes parts, PlantOfJob asked) {
   if (asked.given) {
-    FoundPlant given{*asked.given, {{"given", true}}, asked.given_uncertainty};
+    FoundPlant given{*asked.given, {{"given", true}}, asked.given_uncertainty, asked.given_doubts};
     co_return given;
   }
   if (!asked.model) co_return plant_of_fluid(parts.fluid_models.in_force(), asked.fluid);
@@ -134,6 +140,7 @@ boost::asio::awaitable<Work> work_of(JobRoutes parts, TuneBody body) {
   analysis::TuneRequest request = std::move(body.request);
   request.plant = plant->model;
   request.plant_uncertainty = plant->uncertainty;
+  request.plant_doubts = plant->doubts;
   request.plant_source = std::move(plant->source);
   request.fluids = plants_of_fluids(parts.fluid_models.in_force());
   auto work = [request = std::move(request)](storage::JobRun& job) { return analysis::tune_job(request, job); };

@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "base/json_text.hpp"
+#include "server/analysis/control_json.hpp"
 #include "server/api/bodies/limits.hpp"
 
 namespace server::api {
@@ -17,7 +18,8 @@ using nlohmann::json;
 constexpr std::pair<const char*, Range<std::size_t>> kTexts[] = {
     {"name", text_bytes("FluidModelBody.name")},
     {"comment", text_bytes("FluidModelBody.comment")},
-    {"description", text_bytes("FluidModelBody.description")}};
+    {"description", text_bytes("FluidModelBody.description")},
+    {"confirmed_because", text_bytes("FluidModelBody.confirmed_because")}};
 
 // Each is a float32 on its way to the robot: what is checked is what is sent.
 Result<station::FluidModel::Numbers> sections_in(const Members& body, const char* name, Range<double> allowed) {
@@ -59,7 +61,7 @@ Result<double> fit_error_in(const Members& body) {
   return fit_error;
 }
 
-Result<std::string> document_in(const Members& body) {
+Result<std::string> document_in(const Members& body, const analysis::ModelDoubts& doubts) {
   json document = json::object();
   for (const auto& [name, bytes] : kTexts) {
     if (!body.has(name)) continue;
@@ -72,6 +74,7 @@ Result<std::string> document_in(const Members& body) {
     if (!plant.is_object()) return fail(ErrorCode::bad_request, "plant must be an object", "wrong_type");
     document["plant"] = plant;
   }
+  if (doubts.are_known) document["doubts"] = analysis::json_of(std::span{doubts.doubts});
   std::string text = base::dump(document);
   if (text.size() <= kMaxDocumentBytes) return text;
   return fail(
@@ -89,8 +92,8 @@ json list_of(const station::FluidModel::Numbers& numbers) {
 }  // namespace
 
 Result<station::FluidModel> parse_fluid_model(const std::string& text) {
-  const auto body = Members::parse(
-      text, {"model_gain_m_s", "model_time_constant_s", "fit_error", "plant", "name", "comment", "description"});
+  const auto body = Members::parse(text, {"model_gain_m_s", "model_time_constant_s", "fit_error", "plant", "name",
+                                          "comment", "description", "doubts", "widening", "confirmed_because"});
   if (!body) return std::unexpected{body.error()};
   station::FluidModel model;
   const auto gain = sections_in(*body, "model_gain_m_s", numbers("FluidModelBody.model_gain_m_s[]"));
@@ -100,8 +103,13 @@ Result<station::FluidModel> parse_fluid_model(const std::string& text) {
   if (!time_constant) return std::unexpected{time_constant.error()};
   const auto fit_error = fit_error_in(*body);
   if (!fit_error) return std::unexpected{fit_error.error()};
-  auto document = document_in(*body);
+  const auto doubts = analysis::doubts_from(body->object());
+  if (!doubts) return std::unexpected{doubts.error()};
+  auto document = document_in(*body, *doubts);
   if (!document) return std::unexpected{document.error()};
+  // SAFETY: a model that is in grave doubt is confirmed for robots only by somebody who says why.
+  const bool has_reason = body->has("confirmed_because");
+  if (!has_reason) model.assumed_because = analysis::grave_doubts_in_words(*doubts);
   model.gain_m_s = *gain;
   model.time_constant_s = *time_constant;
   model.fit_error = *fit_error;
@@ -115,6 +123,7 @@ json to_json(const station::FluidModel& model) {
   out["model_gain_m_s"] = list_of(model.gain_m_s);
   out["model_time_constant_s"] = list_of(model.time_constant_s);
   out["fit_error"] = model.fit_error;
+  out["assumed_because"] = model.assumed_because.empty() ? json(nullptr) : json(model.assumed_because);
   out["set_by"] = model.set_by;
   out["set_at_us"] = model.set_at_us;
   return out;

@@ -53,6 +53,7 @@ inline constexpr Limit<std::size_t> kTextLimits[] = {
     {"ExportJobBody.channels", kNameBytes},
     {"FluidBody.fluid", kNameBytes},
     {"FluidModelBody.comment", {0, kMaxDocumentBytes}},
+    {"FluidModelBody.confirmed_because", {1, 1000}},
     {"FluidModelBody.description", {0, kMaxDocumentBytes}},
     {"FluidModelBody.name", {0, kMaxDocumentBytes}},
     {"LoginBody.password", {0, 10 * runtime::kMaxPasswordBytes}},

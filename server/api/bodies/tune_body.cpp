@@ -39,8 +39,11 @@ Result<void> read_plant(const Members& body, Range<std::int64_t> ids, Range<std:
     if (!model) return std::unexpected{model.error()};
     const auto uncertainty = analysis::uncertainty_from(body.object().at("plant"));
     if (!uncertainty) return std::unexpected{uncertainty.error()};
+    const auto doubts = analysis::doubts_from(body.object().at("plant"));
+    if (!doubts) return std::unexpected{doubts.error()};
     plant.given = *model;
     plant.given_uncertainty = *uncertainty;
+    plant.given_doubts = *doubts;
   }
   return {};
 }

@@ -17,6 +17,7 @@ struct PlantOfJob {
   std::string fluid;                       // its model in force
   std::optional<control::FractionalModel> given;
   analysis::PlantUncertainty given_uncertainty;
+  analysis::ModelDoubts given_doubts;
 };
 
 // The plant, its source and the fluids of the requests are left to the route, which looks them up.

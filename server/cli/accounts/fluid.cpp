@@ -49,6 +49,12 @@ json read_model(const std::filesystem::path& file) {
       fmt::format("'{}' is not a JSON object, as `rheonaut estimator --json` writes it", file.string())};
 }
 
+json model_in(const FluidCommand& options) {
+  json model = read_model(options.file);
+  if (!options.confirm_because.empty()) model["confirmed_because"] = options.confirm_because;
+  return model;
+}
+
 int list(const FluidCommand& options, std::ostream& out) {
   const json fluids = ask(options, "GET", "/api/v1/fluids").at("fluids");
   if (options.json) fmt::print(out, "{}\n", fluids.dump(2));
@@ -67,14 +73,21 @@ int list(const FluidCommand& options, std::ostream& out) {
 int change(const FluidCommand& options, std::ostream& out) {
   const bool removes = options.act == FluidCommand::Act::remove_model;
   const std::string path = path_of_model(options.fluid);
-  const json answer = removes ? ask(options, "POST", path + "/remove", json::object())
-                              : ask(options, "POST", path, read_model(options.file));
+  const json answer =
+      removes ? ask(options, "POST", path + "/remove", json::object()) : ask(options, "POST", path, model_in(options));
   if (options.json) {
     fmt::print(out, "{}\n", answer.dump(2));
     return 0;
   }
   fmt::print(out, "The fluid {} has {}\n", answer.at("fluid").get<std::string>(),
              removes ? "no model any more" : "this model from now on");
+  const json because = removes ? json() : answer.at("model").at("assumed_because");
+  if (because.is_string()) {
+    fmt::print(out,
+               "Robots are sent it as assumed only, since it is in doubt: {}. Identify it anew; or confirm it with "
+               "--confirm-because and a reason\n",
+               because.get<std::string>());
+  }
   const auto robots = answer.at("robots_not_updated").get<std::vector<std::string>>();
   if (!robots.empty()) {
     fmt::print(out, "Not sent to the robots in it before their fluid is named again: {}\n", fmt::join(robots, ", "));
@@ -94,6 +107,10 @@ void add_options(CLI::App& command, FluidCommand& options) {
   model->add_option("fluid", options.fluid, "The fluid, as `rheonaut fluid list` names it")->required()->check(named());
   model->add_option("file", options.file, "The model, from `rheonaut estimator --json`; -: standard input")
       ->required()
+      ->check(named());
+  model
+      ->add_option("--confirm-because", options.confirm_because,
+                   "Why robots may take a model that is in grave doubt for that of the fluid; it stands in the audit")
       ->check(named());
   model->add_flag("--json", options.json, "As JSON");
   model->footer("Example: rheonaut fluid model water model.json --data lab");

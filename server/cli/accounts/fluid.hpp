@@ -17,7 +17,8 @@ struct FluidCommand {
   Act act = Act::list;
   std::filesystem::path data_dir = "rheonaut-data";
   std::string fluid;
-  std::filesystem::path file;  // the model, as `rheonaut estimator --json` writes it; "-": standard input
+  std::filesystem::path file;   // the model, as `rheonaut estimator --json` writes it; "-": standard input
+  std::string confirm_because;  // why a model in grave doubt is the fluid's all the same; empty: it is not said to be
   bool json = false;
 };
 

@@ -111,7 +111,9 @@ void add_options(CLI::App& command, Bode& options) {
 }
 
 int run(const Bode& options, std::ostream& out) {
-  const control::OpenLoop loop{read(options.plant), read(options.controller), options.is_velocity_loop};
+  const Plant plant = read(options.plant);
+  say_doubts(options.plant, plant);
+  const control::OpenLoop loop{plant.model, read(options.controller), options.is_velocity_loop};
   if (options.form.is_csv) {
     write_points(out, response(options, loop, options.points.value_or(kCsvPoints)));
     return 0;

@@ -50,15 +50,18 @@ void add_option(CLI::App& command, ControllerChoice& choice) {
       ->check(named());
 }
 
-control::FractionalModel read(const PlantChoice& choice) {
-  if (!choice.file || *choice.file == "non_newtonian") return control::kNonNewtonianModel;
-  if (*choice.file == "newtonian") return control::kNewtonianModel;
-  return value_of(*choice.file, analysis::model_from(read_json(*choice.file)));
+Plant read(const PlantChoice& choice) {
+  if (!choice.file || *choice.file == "non_newtonian") return {control::kNonNewtonianModel, {}, {}};
+  if (*choice.file == "newtonian") return {control::kNewtonianModel, {}, {}};
+  const std::string& file = *choice.file;
+  const nlohmann::json document = read_json(file);
+  return {value_of(file, analysis::model_from(document)), value_of(file, analysis::uncertainty_from(document)),
+          value_of(file, analysis::doubts_from(document))};
 }
 
-std::optional<control::ExpectedUncertainty> read_uncertainty(const PlantChoice& choice) {
-  if (!choice.file || *choice.file == "non_newtonian" || *choice.file == "newtonian") return std::nullopt;
-  return value_of(*choice.file, analysis::uncertainty_from(read_json(*choice.file)));
+void say_doubts(const PlantChoice& choice, const Plant& plant) {
+  const std::string words = analysis::doubts_in_words(plant.doubts);
+  if (!words.empty()) fmt::print(stderr, "rheonaut: warning: {}: {}\n", *choice.file, words);
 }
 
 control::FopdController read(const ControllerChoice& choice) {

@@ -9,6 +9,7 @@
 #include "control/identification/identify.hpp"
 #include "control/identification/planned_experiment.hpp"
 #include "control/models/transfer_function.hpp"
+#include "server/analysis/control_json.hpp"
 #include "server/analysis/csv_columns.hpp"
 #include "server/analysis/run_recording.hpp"
 
@@ -29,10 +30,18 @@ struct ControllerChoice {
 void add_option(CLI::App& command, PlantChoice& choice);
 void add_option(CLI::App& command, ControllerChoice& choice);
 
-control::FractionalModel read(const PlantChoice& choice);      // none: (29)
+// How well the parameters are known, and what is in doubt, where identify has made the file.
+struct Plant {
+  control::FractionalModel model;
+  std::optional<control::ExpectedUncertainty> uncertainty;
+  analysis::ModelDoubts doubts;
+};
+
+Plant read(const PlantChoice& choice);  // once, since it may be a pipe; none: (29)
+// In one line on standard error, where something is in doubt that widens what is computed from the plant.
+void say_doubts(const PlantChoice& choice, const Plant& plant);
+
 control::FopdController read(const ControllerChoice& choice);  // none: (30)
-// How well the plant's parameters are known, where identify has made the file.
-std::optional<control::ExpectedUncertainty> read_uncertainty(const PlantChoice& choice);
 
 analysis::CsvColumns read_csv(const std::string& file, std::initializer_list<const char*> required,
                               std::initializer_list<const char*> optional = {},

@@ -7,6 +7,7 @@
 #include <CLI/CLI.hpp>
 
 #include "server/analysis/control_json.hpp"
+#include "server/analysis/optional_json.hpp"
 #include "server/cli/design/tune.hpp"
 
 namespace server::cli {
@@ -35,18 +36,26 @@ void add_options(CLI::App& command, EstimatorQuestion& question) {
 }
 
 int run(const EstimatorQuestion& question, std::ostream& out) {
-  const control::FractionalModel plant = read(question.plant);
-  const control::EstimatorModel model = control::estimator_model(plant);
+  const Plant plant = read(question.plant);
+  say_doubts(question.plant, plant);
+  const control::EstimatorModel model = control::estimator_model(plant.model);
+  const analysis::ModelDoubts& known = plant.doubts;
   if (question.form.is_json) {
     analysis::OrderedJson answer = analysis::json_of(model);
-    answer["plant"] = analysis::json_of(plant);
+    answer["plant"] = analysis::json_of(plant.model);
+    if (known.are_known) {
+      answer["doubts"] = analysis::json_of(std::span{known.doubts});
+      answer["widening"] = analysis::or_null(control::widening(known.doubts));
+    }
     write_json(out, answer);
   } else if (model.is_met) {
     write_parameters(out, model);
-    fmt::print(out,
-               "fit error {} % of the final velocity, from 10 ms to 60 s: the robot can use this model. It is in force "
-               "once the robot is told, with model_confirmed = 1 in this fluid only.\n",
-               fixed(100 * model.fit_error, 3));
+    const std::string grave = analysis::grave_doubts_in_words(known);
+    fmt::print(out, "fit error {} % of the final velocity, from 10 ms to 60 s: the robot can use this model{}\n",
+               fixed(100 * model.fit_error, 3),
+               grave.empty()
+                   ? ". It is in force once the robot is told, with model_confirmed = 1 in this fluid only."
+                   : fmt::format(" as assumed only, with model_confirmed = 0, since it is in doubt: {}.", grave));
   }
   return model.is_met ? 0 : not_done(kInfeasible, "the robot cannot use a model of this plant: " + model.reason);
 }

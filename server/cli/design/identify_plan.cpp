@@ -36,7 +36,7 @@ control::PlannedExperiment experiment_of(const Plan& plan, bool fits_offset) {
 const char* text(PlannedDuty value) { return value == PlannedDuty::step ? "step" : "prbs"; }
 
 int run_plan(const Identify& options, std::ostream& out) {
-  const control::FractionalModel plant = read(options.plant);
+  const control::FractionalModel plant = read(options.plant).model;
   const auto expected = control::expected_uncertainty(plant, experiment_of(options.plan, options.search.fits_offset));
   if (options.form.is_json) {
     analysis::OrderedJson answer = analysis::json_of(expected);

@@ -270,7 +270,9 @@ int run(const Predict& options, std::ostream& out) {
   Measured measured = options.run.run ? follow(options, experiment) : Measured{};
   measured.predicted_with +=
       controllers_in_words(checksum_of(controller.chosen, experiment), measured.controller_checksum);
-  experiment.plant = read(options.plant);
+  const Plant plant = read(options.plant);
+  say_doubts(options.plant, plant);
+  experiment.plant = plant.model;
   experiment.controller = controller.chosen.sections;
   experiment.period_s = options.sampling.period_s;
   const control::ClosedLoopPrediction prediction = control::predict_closed_loop(experiment);

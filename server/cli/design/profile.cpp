@@ -39,6 +39,8 @@ struct Predicted {
 // Repeats of a combination are the same, and are predicted once.
 std::vector<Predicted> predict(const Profile& profile, const ProfileQuestion& options) {
   const control::ParallelSections sections = discretised(read(options.controller), options.sampling).chosen.sections;
+  const Plant given = read(options.plant);
+  say_doubts(options.plant, given);
   std::vector<Predicted> runs;
   for (const Variant& variant : experiments::variants_of(profile)) {
     if (variant.repeat > 1) {
@@ -46,14 +48,15 @@ std::vector<Predicted> predict(const Profile& profile, const ProfileQuestion& op
       runs.back().variant = variant;
       continue;
     }
-    PlantChoice plant = options.plant;
-    if (!plant.file && variant.fluid == "water") plant.file = "newtonian";
+    PlantChoice choice = options.plant;
+    if (!choice.file && variant.fluid == "water") choice.file = "newtonian";
+    const Plant plant = choice.file == options.plant.file ? given : read(choice);
     TimeLine line = experiments::time_line_of(profile, variant);
     const Profile of_run = experiments::profile_of_run(profile, variant);
-    Preview preview = experiments::preview_of(of_run, line, read(plant), sections);
+    Preview preview = experiments::preview_of(of_run, line, plant.model, sections);
     std::vector<double> sd_m;
-    if (const auto uncertainty = read_uncertainty(plant)) {
-      sd_m = experiments::position_sd_of(of_run, line, read(plant), *uncertainty, sections);
+    if (plant.uncertainty) {
+      sd_m = experiments::position_sd_of(of_run, line, plant.model, *plant.uncertainty, sections);
     }
     runs.push_back({variant, std::move(line), std::move(preview), std::move(sd_m)});
   }

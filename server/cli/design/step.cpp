@@ -67,7 +67,9 @@ void add_options(CLI::App& command, Step& options) {
 }
 
 int run(const Step& options, std::ostream& out) {
-  const control::FractionalModel plant = read(options.plant);
+  const Plant read_plant = read(options.plant);
+  say_doubts(options.plant, read_plant);
+  const control::FractionalModel& plant = read_plant.model;
   std::vector<double> times_s, duty;
   control::TimeResponse response;
   if (!options.duty_csv) {

@@ -79,10 +79,10 @@ void write_ranges(std::ostream& out, const Tune& options, const Ranges& ranges) 
 }
 
 // ± 2 sd of margin and crossover, or that they are not known; nothing for the paper's models.
-void write_margin_sigmas(std::ostream& out, const PlantChoice& choice, const control::FractionalModel& plant,
+void write_margin_sigmas(std::ostream& out, const PlantChoice& choice, const Plant& plant,
                          const control::TuningResult& result) {
   if (!choice.file || *choice.file == "newtonian" || *choice.file == "non_newtonian") return;
-  const auto sigmas = analysis::margin_sigmas(plant, result, read_uncertainty(choice));
+  const auto sigmas = analysis::margin_sigmas(plant.model, result, plant.uncertainty);
   if (!sigmas) {
     fmt::print(out, "the sigmas of the plant's parameters are not known: the margin takes them as exact\n");
     return;
@@ -91,12 +91,13 @@ void write_margin_sigmas(std::ostream& out, const PlantChoice& choice, const con
              cell(2 * sigmas->phase_margin_deg, 2), cell(2 * sigmas->gain_crossover_rad_s, 2));
 }
 
-analysis::OrderedJson answer_of(const Tune& options, const control::FractionalModel& plant,
-                                const control::TuningResult& result, const Ranges& ranges) {
-  analysis::OrderedJson answer = analysis::tuning_json(plant, options.spec, result, ranges);
-  analysis::add_margin_sigmas(plant, result, read_uncertainty(options.plant), answer);
+analysis::OrderedJson answer_of(const Tune& options, const Plant& plant, const control::TuningResult& result,
+                                const Ranges& ranges) {
+  analysis::OrderedJson answer = analysis::tuning_json(plant.model, options.spec, result, ranges);
+  analysis::add_margin_sigmas(plant.model, result, plant.uncertainty, answer);
+  analysis::add_plant_doubts(plant.doubts, answer);
   if (options.with_robustness && result.tuned) {
-    answer["robustness"] = analysis::json_of(robustness_of(plant, result.tuned->controller));
+    answer["robustness"] = analysis::json_of(robustness_of(plant.model, result.tuned->controller));
   }
   return answer;
 }
@@ -124,8 +125,7 @@ void write_map_csv(std::ostream& out, std::span<const control::TuningMapPoint> m
   }
 }
 
-int write_map(const Tune& options, std::ostream& out) {
-  const control::FractionalModel plant = read(options.plant);
+int write_map(const Tune& options, const control::FractionalModel& plant, std::ostream& out) {
   control::TuningMapSpec spec = options.map;
   spec.is_velocity_loop = options.spec.is_velocity_loop;
   spec.period_s = options.spec.period_s;
@@ -194,17 +194,18 @@ void add_options(CLI::App& command, Tune& options) {
 
 int run(const Tune& options, std::ostream& out) {
   const Progress progress{"tune", options.form};
-  if (options.is_map) return write_map(options, out);
-  const control::FractionalModel plant = read(options.plant);
-  const control::TuningResult result = control::tune(plant, options.spec);
-  const Ranges ranges = control::sound_phase_margins(plant, options.spec);
+  const Plant plant = read(options.plant);
+  say_doubts(options.plant, plant);
+  if (options.is_map) return write_map(options, plant.model, out);
+  const control::TuningResult result = control::tune(plant.model, options.spec);
+  const Ranges ranges = control::sound_phase_margins(plant.model, options.spec);
   if (options.form.is_json) {
     write_json(out, answer_of(options, plant, result, ranges));
   } else if (result.tuned) {
     write_asked_and_achieved(out, options, *result.tuned);
     write_margin_sigmas(out, options.plant, plant, result);
     write_ranges(out, options, ranges);
-    if (options.with_robustness) write_robustness(out, robustness_of(plant, result.tuned->controller));
+    if (options.with_robustness) write_robustness(out, robustness_of(plant.model, result.tuned->controller));
   } else {
     write_ranges(out, options, ranges);
     write_offers(out, "nearest", result.nearest);

@@ -167,7 +167,8 @@ bool AutotuneChain::keep_model() {
                          {"parameters", found.at("parameters")},
                          {"fit_percent", found.at("fit_percent")},
                          {"validation", found.value("validation", json())},
-                         {"warnings", found.value("warnings", json::array())}});
+                         {"warnings", found.value("warnings", json::array())},
+                         {"doubts", found.value("doubts", json())}});
   say(fmt::format("model: design {}, fits to {:.1f} %", id, found.at("fit_percent").get<double>()));
   for (const json& warning : found.value("warnings", json::array())) {
     say("  warning: " + warning.get<std::string>());
@@ -218,6 +219,9 @@ bool AutotuneChain::tune() {
   if (!is_feasible()) return false;
   const json controller{{"kp", tuning_.at("kp")}, {"kd", tuning_.at("kd")}, {"mu", tuning_.at("mu")}};
   state_.finish(kTuning, {{"asked", asked}, {"controller", controller}, {"achieved", tuning_.at("achieved")}});
+  if (const std::string doubts = tuning_.value("plant_doubts_text", std::string{}); !doubts.empty()) {
+    say("  the model: " + doubts);
+  }
   say(fmt::format("tuning: kp {:.6g}, kd {:.6g}, mu {:.6g}", controller.at("kp").get<double>(),
                   controller.at("kd").get<double>(), controller.at("mu").get<double>()));
   return true;

@@ -16,9 +16,10 @@ Result<FittedModel> fitted_model_from(storage::JobId job, const json& result) {
     fitted.model = *model;
     fitted.end = result.at("end").get<std::string>();
     const bool is_optimum = fitted.end == analysis::text(control::SearchEnd::converged);
-    for (std::size_t i = 0; is_optimum && i < control::kParameters; ++i) {
+    const json widening = result.contains("widening") ? result.at("widening") : json(1);  // an earlier version's
+    for (std::size_t i = 0; is_optimum && widening.is_number() && i < control::kParameters; ++i) {
       const json& sigma = result.at("one_sigma").at(control::kParameterNames[i]);
-      if (sigma.is_number()) fitted.one_sigma[i] = sigma.get<double>();
+      if (sigma.is_number()) fitted.one_sigma[i] = sigma.get<double>() * widening.get<double>();
     }
     fitted.residual_sd = result.at("residual_sd").get<double>();
     fitted.fit_percent = result.at("fit_percent").get<double>();

@@ -36,15 +36,36 @@ bool is_at_rest(const RobotState& robot) {
 ModelExchange::ModelExchange(runtime::Clock& clock, ModelRobot& robot, FluidNaming naming)
     : clock_{clock}, robot_{robot}, naming_{std::move(naming)}, deadline_us_{clock.steady_us() + kPatience.count()} {}
 
-asio::awaitable<Result<void>> ModelExchange::run() { return naming_.model ? send_model() : take_back(); }
+asio::awaitable<Result<void>> ModelExchange::run() {
+  if (!naming_.model) return take_back();
+  return naming_.model->is_confirmed() ? send_model() : send_as_assumed();
+}
 
-asio::awaitable<Result<void>> ModelExchange::send_model() {
+// SAFETY: a robot takes a model that is in doubt for its own guess, and stays as unsure as a robot without one. What it
+// held as confirmed is taken back before the first parameter changes.
+asio::awaitable<Result<void>> ModelExchange::send_as_assumed() {
+  Outcome done;
+  if (robot_.confirmation() != false) done = co_await take_back();
+  if (!done) co_return done;
+  const std::optional<float> in_force = robot_.parameters().value(kModelSectionError);
+  if (!in_force || *in_force < kAssumedSectionError) done = co_await set(kModelSectionError, kAssumedSectionError);
+  if (done) done = co_await send_sections();
+  co_return done;
+}
+
+asio::awaitable<Result<void>> ModelExchange::send_sections() {
   for (const auto& [name, value] : parameters_of(*naming_.model)) {
     const std::optional<float> in_force = robot_.parameters().value(name);
     if (in_force && is_same(*in_force, value)) continue;
     Outcome done = co_await set(name, value);
     if (!done) co_return done;
   }
+  co_return Outcome{};
+}
+
+asio::awaitable<Result<void>> ModelExchange::send_model() {
+  const Outcome sent = co_await send_sections();
+  if (!sent) co_return sent;
   Outcome confirmed = co_await set(kModelConfirmed, 1);
   if (confirmed) confirmed = co_await wait_for_confirmation(true);
   if (confirmed && !holds(robot_.parameters(), *naming_.model)) {

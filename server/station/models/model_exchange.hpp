@@ -2,7 +2,8 @@
 //
 //   the parameters of the model that the robot does not hold yet, one by one, each read back
 //     → model_confirmed = 1, once all eight are the model's → done when telemetry shows it
-//   without a model: model_confirmed = 0 → done when telemetry shows it
+//   a model that is assumed only: model_confirmed = 0, seen in telemetry, and model_section_error come first → done
+//   when all are read back without a model: model_confirmed = 0 → done when telemetry shows it
 //
 // A robot takes parameters at rest only, so one that moves is waited for, for kPatience. Ends early when another fluid
 // is named, the robot boots or the link breaks. Loop thread; lives as long as run() does.
@@ -45,6 +46,8 @@ class ModelExchange {
   using Outcome = Result<void>;
 
   boost::asio::awaitable<Outcome> send_model();
+  boost::asio::awaitable<Outcome> send_sections();
+  boost::asio::awaitable<Outcome> send_as_assumed();
   boost::asio::awaitable<Outcome> take_back();
   boost::asio::awaitable<Outcome> set(std::string name, float value);
   boost::asio::awaitable<Outcome> read_back(std::string name, float value);

@@ -43,6 +43,13 @@ RobotModel confirmed_model(const std::string& fluid, const FluidModel& model) {
   return confirmed;
 }
 
+RobotModel model_held_as_assumed(const FluidNaming& naming) {
+  RobotModel held =
+      assumed_model(fmt::format("sent as assumed only, since it is in doubt: {}", naming.model->assumed_because));
+  add_fluid(held, naming.fluid, *naming.model);
+  return held;
+}
+
 RobotModel model_confirmed_by_command() { return model_in(ModelState::confirmed, "by a command, and of no fluid"); }
 
 RobotModel failed_model(const FluidNaming& naming, const Error& error) {
@@ -56,6 +63,10 @@ RobotModel model_to_be_taken_back() { return model_in(ModelState::failed, kNotTa
 
 std::string confirmed_words(const FluidNaming& naming) {
   return fmt::format("{} by {}", naming.fluid, naming.by.actor);
+}
+
+std::string held_as_assumed_words(const FluidNaming& naming) {
+  return fmt::format("{} by {}, as assumed only: {}", naming.fluid, naming.by.actor, naming.model->assumed_because);
 }
 
 std::string taken_back_words(const FluidNaming& naming) {

@@ -19,6 +19,8 @@ RobotModel unsent_model(const FluidModelList& models, const std::string& fluid);
 // The model is on its way, or what was confirmed before is being taken back.
 RobotModel model_on_its_way(const FluidNaming& naming);
 RobotModel confirmed_model(const std::string& fluid, const FluidModel& model);
+// The robot holds it, and is as unsure as before: the model is in doubt.
+RobotModel model_held_as_assumed(const FluidNaming& naming);
 // Somebody has confirmed what the robot holds; the station knows no fluid of it.
 RobotModel model_confirmed_by_command();
 // The exchange with the robot has failed.
@@ -28,6 +30,7 @@ RobotModel model_to_be_taken_back();
 
 // The details of the events, for people.
 std::string confirmed_words(const FluidNaming& naming);
+std::string held_as_assumed_words(const FluidNaming& naming);
 std::string taken_back_words(const FluidNaming& naming);
 std::string not_sent_words(const FluidNaming& naming, const Error& error);
 

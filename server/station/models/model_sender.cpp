@@ -65,8 +65,9 @@ void ModelSender::on_fluid_named(const RobotState& robot, const Author& by) {
                        robot.model.fluid == robot.fluid && !robot.fluid.empty();
   entry.naming = {entry.naming.number + 1, by, robot.boot_id, robot.fluid,
                   model == nullptr ? std::nullopt : std::optional{*model}};
-  if (model != nullptr && is_this && holds(station_.settings(robot.id)->parameters, *model)) return;
-  const bool is_to_be_taken_back = model == nullptr || !is_this;
+  const bool is_confirmed_model = model != nullptr && model->is_confirmed();
+  if (is_confirmed_model && is_this && holds(station_.settings(robot.id)->parameters, *model)) return;
+  const bool is_to_be_taken_back = !is_confirmed_model || !is_this;
   entry.owes = entry.owes || (may_be_confirmed && is_to_be_taken_back);
   if (entry.owes) open_.insert(robot.id);
   wake_.notify();
@@ -124,7 +125,10 @@ void ModelSender::conclude(const RobotId& id, const FluidNaming& naming, const O
   if (!outcome) return conclude_failure(id, naming, outcome.error());
   entry.owes = false;
   entry.reported_failure.clear();
-  if (naming.model) {
+  if (naming.model && !naming.model->is_confirmed()) {
+    station_.set_model(id, model_held_as_assumed(naming));
+    station_.note_model(id, "model_assumed", held_as_assumed_words(naming));
+  } else if (naming.model) {
     station_.set_model(id, confirmed_model(naming.fluid, *naming.model));
     station_.note_model(id, "model_confirmed", confirmed_words(naming));
   } else {
@@ -236,7 +240,9 @@ void ModelSender::follow(const RobotState& robot, Entry& entry) {
 }
 
 void ModelSender::follow_confirmation(const RobotState& robot, Entry& entry) {
-  const FluidModel* model = models_.find(robot.fluid);
+  // SAFETY: a model in doubt is confirmed for no robot, also not one that holds its very bits.
+  const FluidModel* stored = models_.find(robot.fluid);
+  const FluidModel* model = stored != nullptr && stored->is_confirmed() ? stored : nullptr;
   const auto [finding, is_open] =
       judge(robot, entry.seen, station_.settings(robot.id)->parameters, entry.naming.model, model, clock_.steady_us());
   if (is_open) open_.insert(robot.id);

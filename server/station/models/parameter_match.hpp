@@ -8,6 +8,8 @@ namespace server::station {
 
 // The parameter that confirms the other eight.
 inline constexpr const char* kModelConfirmed = "model_confirmed";
+// How far the eight may be off, while nobody confirms them.
+inline constexpr const char* kModelSectionError = "model_section_error";
 
 // All eight have been reported, and are the model's.
 bool holds(const ParameterTable& reported, const FluidModel& model);

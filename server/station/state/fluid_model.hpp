@@ -22,15 +22,21 @@ inline constexpr float kMinModelTimeConstant_s = 0.001F;
 inline constexpr float kMaxModelTimeConstant_s = 1000;
 // Of the final velocity. SAFETY: with a model that fits worse a robot is surer of its position than it may be.
 inline constexpr double kMaxModelFitError = 0.005;
+// sd of each gain by itself, a share of their sum, of a model that is assumed only: at least that of a robot that
+// nobody told its fluid (docs/robot.md). SAFETY: a robot whose model is in doubt is as unsure as one without.
+inline constexpr float kAssumedSectionError = 0.12F;
 
 struct FluidModel {
   using Numbers = std::array<float, kFluidModelSections>;
   Numbers gain_m_s{};
   Numbers time_constant_s{};
-  double fit_error = 0;         // a share of the final velocity, in [0, kMaxModelFitError]
+  double fit_error = 0;  // a share of the final velocity, in [0, kMaxModelFitError]
+  std::string
+      assumed_because;  // the grave doubts about it, in words: robots are sent it as assumed; empty: as confirmed
   std::string document = "{}";  // what else came with it, as JSON: plant, name, comment, description
   std::string set_by;           // the actor
   std::int64_t set_at_us = 0;   // UTC
+  bool is_confirmed() const { return assumed_because.empty(); }
   bool operator==(const FluidModel&) const = default;
 };
 

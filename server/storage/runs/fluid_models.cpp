@@ -19,7 +19,7 @@ namespace {
 
 constexpr const char* kModelColumns =
     "fluid, set_at_us, set_by, gain_1_m_s, gain_2_m_s, gain_3_m_s, gain_4_m_s, time_constant_1_s, time_constant_2_s,"
-    " time_constant_3_s, time_constant_4_s, fit_error, document";
+    " time_constant_3_s, time_constant_4_s, fit_error, document, assumed_because";
 constexpr int kFirstGain = 3;  // in that order, as are the next
 constexpr int kFirstTimeConstant = kFirstGain + static_cast<int>(station::kFluidModelSections);
 constexpr int kFitError = kFirstTimeConstant + static_cast<int>(station::kFluidModelSections);
@@ -45,8 +45,20 @@ std::vector<Named> read_in_force(SQLite::Database& database) {
     }
     model.fit_error = rows.getColumn(kFitError).getDouble();
     model.document = rows.getColumn(kFitError + 1).getString();
+    model.assumed_because = rows.getColumn(kFitError + 2).getString();
   }
   return models;
+}
+
+// With the reason of who confirms it all the same.
+std::string audit_detail_of(const station::FluidModel& model) {
+  nlohmann::json detail{{"fit_error", model.fit_error}};
+  if (!model.assumed_because.empty()) detail["assumed_because"] = model.assumed_because;
+  const auto document = nlohmann::json::parse(model.document, nullptr, false);
+  if (document.is_object() && document.contains("confirmed_because")) {
+    detail["confirmed_because"] = document.at("confirmed_because");
+  }
+  return station::audit_detail(detail);
 }
 
 // Null: the fluid has none from now on.
@@ -55,7 +67,7 @@ void append(SQLite::Database& database, const std::string& fluid, const station:
   SQLite::Transaction transaction{database, SQLite::TransactionBehavior::IMMEDIATE};
   SQLite::Statement add{
       database,
-      fmt::format("INSERT INTO fluid_model ({}) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)", kModelColumns)};
+      fmt::format("INSERT INTO fluid_model ({}) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)", kModelColumns)};
   bind_all(add, fluid, by.at_us, by.actor);
   if (model != nullptr) {
     int index = kFirstGain;
@@ -63,12 +75,13 @@ void append(SQLite::Database& database, const std::string& fluid, const station:
     bind_value(add, ++index, model->fit_error);
     bind_value(add, ++index, model->document);
   }
+  bind_value(add, kFitError + 3, model != nullptr ? model->assumed_because : std::string{});
   add.exec();
   station::AuditNote note;
   note.by = by;
   note.action = model != nullptr ? "fluid.model_set" : "fluid.model_removed";
   note.subject = fluid;
-  if (model != nullptr) note.detail = station::audit_detail({{"fit_error", model->fit_error}});
+  if (model != nullptr) note.detail = audit_detail_of(*model);
   AuditChain{database}.append(note);
   transaction.commit();
 }

@@ -899,8 +899,8 @@ CREATE TABLE fluid_model (
   time_constant_4_s REAL,
   fit_error REAL,        -- a share of the final velocity
   document TEXT          -- JSON: the plant that it was fitted to, and what else came with it
-);
-INSERT INTO fluid_model VALUES(1,'water',1795575966000000,'token:local',1.00000001490116119384e-01,-3.33333343267440795898e-01,0.0,10.0,2.99999993294477462768e-02,0.5,3.0,1000.0,0.0021,'{"comment":"at 20 °C"}');
+, assumed_because TEXT NOT NULL DEFAULT '');
+INSERT INTO fluid_model VALUES(1,'water',1795575966000000,'token:local',1.00000001490116119384e-01,-3.33333343267440795898e-01,0.0,10.0,2.99999993294477462768e-02,0.5,3.0,1000.0,0.0021,'{"comment":"at 20 °C"}','');
 CREATE TABLE outside_reference (
   reference_id INTEGER PRIMARY KEY,
   run_id INTEGER NOT NULL REFERENCES run,

@@ -313,7 +313,7 @@ CREATE TABLE fluid_model (
   time_constant_4_s REAL,
   fit_error REAL,        -- a share of the final velocity
   document TEXT          -- JSON: the plant that it was fitted to, and what else came with it
-);
+, assumed_because TEXT NOT NULL DEFAULT '');
 CREATE VIEW run_sample AS
 SELECT
   run_span.run_id,

@@ -109,6 +109,51 @@ TEST_F(FluidModelsRouteTest, IsKeptForItsFluidAndListed) {
   EXPECT_EQ(entries[1]["subject"], "water");
 }
 
+json doubt_of(const char* code, json widening) {
+  return {
+      {"code", code}, {"value", 0.5}, {"widening", std::move(widening)}, {"grave", false}, {"text", "says the client"}};
+}
+
+// SAFETY's test: whether a doubt is grave, the station says by its number.
+TEST_F(FluidModelsRouteTest, OneInGraveDoubtIsAssumedUnlessSomebodySaysWhyNot) {
+  json body = printed();
+  body["doubts"] = json::array({doubt_of("residuals_not_white", 1.9)});
+  ASSERT_EQ(ask("POST", kModel, body).status, 200);
+  EXPECT_EQ(model_of("water")["assumed_because"], nullptr);
+  EXPECT_EQ(model_of("water")["doubts"][0]["widening"], 1.9);
+
+  for (const json& widening : {json(14.5), json(nullptr)}) {
+    body["doubts"] = json::array({doubt_of("no_linear_model_over_amplitude", widening)});
+    const Answered set = ask("POST", kModel, body);
+    ASSERT_EQ(set.status, 200) << set.body;
+    EXPECT_THAT(set.parsed()["model"]["assumed_because"].get<std::string>(), HasSubstr("no linear model holds"));
+    EXPECT_EQ(set.parsed()["model"]["doubts"][0]["grave"], true);
+  }
+  body["confirmed_because"] = "checked against the camera";
+  ASSERT_EQ(ask("POST", kModel, body).status, 200);
+  EXPECT_EQ(model_of("water")["assumed_because"], nullptr);
+  EXPECT_EQ(model_of("water")["confirmed_because"], "checked against the camera");
+  const json entries = ask("GET", "/api/v1/audit?action=fluid").parsed()["entries"];
+  EXPECT_EQ(entries[0]["detail"]["confirmed_because"], "checked against the camera") << entries[0];
+  EXPECT_TRUE(entries[1]["detail"].contains("assumed_because")) << entries[1];
+}
+
+TEST_F(FluidModelsRouteTest, DoubtsThatNobodyCanReadAreRefused) {
+  const auto refusal = [this](json doubts) {
+    json body = printed();
+    body["doubts"] = std::move(doubts);
+    const Answered set = ask("POST", kModel, body);
+    EXPECT_EQ(set.status, 400) << set.body;
+    return set.parsed()["detail"].get<std::string>();
+  };
+  EXPECT_THAT(refusal("none"), HasSubstr("a list of at most 32"));
+  EXPECT_THAT(refusal(json::array({1})), HasSubstr("each has \"code\""));
+  EXPECT_THAT(refusal(json::array({doubt_of("bad_mood", 1)})), HasSubstr("the code \"bad_mood\" is not known"));
+  EXPECT_THAT(refusal(json::array({doubt_of("residuals_drift", 0.5)})), HasSubstr("it is 1 at least"));
+  EXPECT_THAT(refusal(json::array({doubt_of("residuals_drift", "much")})), HasSubstr("each has"));
+  EXPECT_THAT(refusal(json(33, doubt_of("residuals_drift", 1))), HasSubstr("a list of at most 32"));
+}
+
 TEST_F(FluidModelsRouteTest, WhatIsNoModelOrOfNoFluidIsRefusedAndNothingIsKept) {
   json bad = printed();
   bad["fit_error"] = 0.02;

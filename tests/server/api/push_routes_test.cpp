@@ -57,7 +57,9 @@ class PushRoutesTest : public ApiTest {
 
 TEST_F(PushRoutesTest, SendsTheCoefficientsOfTheDesignAndComparesWhatTheRobotReports) {
   connect_with_range(-0.5F, 0.75F);
-  keep(tuned());
+  json document = tuned();
+  document["plant_doubts_text"] = "in doubt: the residuals drift";
+  keep(document);
   const Asked asked = push({{"design_id", 1}});
   ASSERT_EQ(robot->commands().size(), 1U);
   const protocol::Command sent = robot->commands().back();
@@ -76,6 +78,7 @@ TEST_F(PushRoutesTest, SendsTheCoefficientsOfTheDesignAndComparesWhatTheRobotRep
   ASSERT_EQ(answered.status, 200) << answered.body;
   const json answer = answered.parsed();
   EXPECT_EQ(answer["design_id"], 1);
+  EXPECT_EQ(answer["plant_doubts_text"], "in doubt: the residuals drift");
   EXPECT_EQ(answer["verified"], true);
   EXPECT_EQ(answer["command"]["state"], "verified");
   EXPECT_EQ(answer["in_force"], ask("GET", kController).parsed());

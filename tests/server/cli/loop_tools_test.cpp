@@ -14,6 +14,50 @@ using ::testing::Not;
 
 class LoopTools : public ToolTest {};
 
+// What identify prints, with doubts of these widenings.
+std::string fit_with(const std::string& doubts) {
+  return R"({"structure": "fractional", "parameters": {"kp": 0.1, "b1": 0.005682, "b2": 0.11031, "b3": 1, "alpha": 1.7263,
+             "beta": 0.8682}, "one_sigma": {"kp": 0.001, "b1": 0.0002, "b2": 0.002, "alpha": 0.01, "beta": 0.01},
+             "correlation": [[1,0,0,0,0],[0,1,0,0,0],[0,0,1,0,0],[0,0,0,1,0],[0,0,0,0,1]])" +
+         doubts + "}";
+}
+
+TEST_F(LoopTools, AMarginIsAsUncertainAsTheDoubtsOfItsModelMakeIt) {
+  const auto sigma = [this](const std::string& doubts) {
+    save("fit.json", fit_with(doubts));
+    return ask("tune --plant @fit.json --crossover-rad-s 5 --phase-margin-deg 91 --json").json();
+  };
+  const auto sure = sigma(R"(, "doubts": [])");
+  const auto wide = sigma(R"(, "doubts": [{"code": "residuals_not_white", "value": 3, "widening": 3}])");
+  const double narrow_deg = sure["achieved"]["phase_margin_sigma_deg"],
+               wide_deg = wide["achieved"]["phase_margin_sigma_deg"];
+  EXPECT_GT(narrow_deg, 0);
+  EXPECT_NEAR(wide_deg, 3 * narrow_deg, 1e-9);
+  EXPECT_EQ(sure["plant_doubts_text"], "");
+  EXPECT_THAT(wide["plant_doubts_text"].get<std::string>(), HasSubstr("each ± that follows is widened 3 times"));
+  EXPECT_EQ(wide["plant_doubts"][0]["grave"], true);
+  const auto unknown = sigma(R"(, "doubts": [{"code": "search_not_converged", "value": 2, "widening": null}])");
+  EXPECT_EQ(unknown["achieved"]["phase_margin_sigma_deg"], nullptr);
+  EXPECT_THAT(unknown["plant_doubts_text"].get<std::string>(), HasSubstr("no ± can be given"));
+  const auto old = sigma("");
+  EXPECT_EQ(old["plant_doubts"], nullptr);
+  EXPECT_THAT(old["plant_doubts_text"].get<std::string>(), HasSubstr("an earlier version has made this fit"));
+  EXPECT_NEAR(old["achieved"]["phase_margin_sigma_deg"].get<double>(), narrow_deg, 1e-12);
+}
+
+TEST_F(LoopTools, AModelInGraveDoubtIsForTheRobotToAssume) {
+  save("fit.json",
+       fit_with(R"(, "doubts": [{"code": "no_linear_model_over_amplitude", "value": 0.5, "widening": 14}])"));
+  const Answer said = ask("estimator --plant @fit.json");
+  EXPECT_EQ(said.exit_code, 0) << said.error;
+  EXPECT_THAT(said.text, HasSubstr("as assumed only, with model_confirmed = 0, since it is in doubt: no linear model"));
+  const auto json = ask("estimator --plant @fit.json --json").json();
+  EXPECT_EQ(json["doubts"][0]["code"], "no_linear_model_over_amplitude");
+  EXPECT_EQ(json["widening"], 14);
+  save("fit.json", fit_with(R"(, "doubts": [])"));
+  EXPECT_THAT(ask("estimator --plant @fit.json").text, HasSubstr("with model_confirmed = 1 in this fluid only"));
+}
+
 TEST_F(LoopTools, BodeGivesTheMarginsOfThePapersLoop) {
   const Answer answer = ask("bode --json");
   ASSERT_EQ(answer.exit_code, 0) << answer.error;

@@ -221,7 +221,7 @@ TEST_F(ReferenceTools, IdentifyWeighsEachPositionByItsOwnSdAndSaysWhatTheyCameTo
 TEST_F(ReferenceTools, IdentifyDoubtsACameraClockThatCameOutOff) {
   const std::string import = "reference import --run 1 --csv @camera.csv --sd-mm 0.5 --reason again --offset-s ";
   const std::string fit = "identify --run 1 --structure first_order";
-  const std::string of_clock = "the outside position's clock came out ", of_plant = "search with --dead-time-s";
+  const std::string of_clock = "the outside position's clock came out ", of_plant = "search for it (--dead-time-s)";
   ASSERT_EQ(ask(import + "-3.4067").exit_code, 0);
   EXPECT_THAT(ask(fit).text, AllOf(HasSubstr(of_clock + "-"), HasSubstr(of_plant)));
   EXPECT_THAT(ask(fit + " --channels robot").text, Not(HasSubstr(of_clock)));
@@ -250,7 +250,7 @@ TEST_F(ReferenceTools, IsReplacedRemovedAndExported) {
 }
 
 TEST_F(ReferenceTools, WhatIsWrongIsOneLine) {
-  EXPECT_THAT(ask("reference import --run 1 --csv @none.csv --sd-mm 1").error, HasSubstr("cannot read"));
+  EXPECT_THAT(ask("reference import --run 1 --csv @none.csv --sd-mm 1").error, HasSubstr("cannot be read"));
   EXPECT_THAT(ask("reference import --run 7 --csv @camera.csv --sd-mm 1").error, HasSubstr("there is no run 7"));
   EXPECT_THAT(ask("reference import --run 1 --csv @camera.csv").error, HasSubstr("--sd-mm"));
   EXPECT_THAT(ask("reference import --run 1 --csv @camera.csv --sd-mm 1 --marker flash --at-s 1").error,

@@ -135,6 +135,10 @@ TEST(FittedModel, IsReadFromTheResultOfAJob) {
   const auto fitted = fitted_model_from(5, result);
   ASSERT_TRUE(fitted) << fitted.error().detail;
   EXPECT_EQ(fitted->model.alpha, 1.7);
+  result["widening"] = 2;
+  EXPECT_EQ(fitted_model_from(5, result)->one_sigma[3], 2 * 0.03) << "its doubts are counted";
+  result["widening"] = nullptr;
+  EXPECT_EQ(fitted_model_from(5, result)->one_sigma[3], std::nullopt) << "nobody knows how much they widen it";
   EXPECT_EQ(fitted->one_sigma[3], 0.03);
   EXPECT_FALSE(fitted->one_sigma[1]);
   EXPECT_TRUE(fitted->is_of_acceleration);

@@ -55,6 +55,47 @@ TEST_F(ModelSenderTest, WhatTheRobotDoesNotHoldYetIsSentAndThenConfirmed) {
   EXPECT_EQ(sent.size(), 7U) << "it is confirmed already";
 }
 
+// SAFETY's test: who wrote it is in grave doubt about it, so the robot stays as unsure as without it.
+TEST_F(ModelSenderTest, AModelInDoubtIsSentAsAssumedAndNeverConfirmed) {
+  station::FluidModel doubted = some_model();
+  doubted.assumed_because = "no linear model holds";
+  held["model_section_error"] = 0.05F;
+  begin();
+  name_fluid("water");  // confirmed, before anybody had a doubt
+  live(5s);
+  ASSERT_EQ(model().state, station::ModelState::confirmed);
+  sent.clear();
+  models.put("water", doubted);
+  name_fluid("water");
+  live(5s);
+  EXPECT_THAT(sent, ElementsAre("model_confirmed", "model_section_error"));
+  EXPECT_EQ(held["model_confirmed"], 0);
+  EXPECT_EQ(held["model_section_error"], station::kAssumedSectionError);
+  EXPECT_TRUE(holds_water());
+  EXPECT_EQ(model().state, station::ModelState::assumed);
+  EXPECT_EQ(model().reason, "sent as assumed only, since it is in doubt: no linear model holds");
+  EXPECT_EQ(model().fluid, "water");
+  EXPECT_EQ(events().back(), "model_assumed");
+
+  held["model_confirmed"] = 1;  // by somebody's command
+  say("model_confirmed", 1);
+  live(2s);
+  EXPECT_EQ(model().reason, "by a command, and of no fluid") << "though it holds the very bits";
+}
+
+TEST_F(ModelSenderTest, AModelInDoubtLeavesARobotUnsurerThatIsSoAlready) {
+  station::FluidModel doubted = some_model();
+  doubted.assumed_because = "no linear model holds";
+  models.put("water", doubted);
+  held["model_section_error"] = 0.5F;
+  begin();
+  name_fluid("water");
+  live(5s);
+  EXPECT_THAT(sent, Not(Contains("model_confirmed")));
+  EXPECT_EQ(held["model_section_error"], 0.5F);
+  EXPECT_TRUE(holds_water());
+}
+
 TEST_F(ModelSenderTest, OfParametersThatHoldOnlyTheConfirmationIsSent) {
   for (const auto& [name, value] : parameters_of(some_model())) held[name] = value;
   begin();

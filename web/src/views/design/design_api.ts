@@ -124,6 +124,7 @@ export interface Tuned extends Law {
   plant: Plant;
   discretised: Discretised | null;
   robustness: { rows: RobustnessRow[]; duty_sd_per_noise_sd: number } | null;
+  plant_doubts_text?: string; // a line for people; empty: nothing is in doubt
   predicted: Predicted[];
 }
 

@@ -81,6 +81,11 @@ export function Achievement({ asked, tuned, own, is_dragged, on_ask }: Achieveme
           </tr>
         </tbody>
       </table>
+      {tuned?.plant_doubts_text && (
+        <p class="design-caution design-note" id="design-plant-doubts">
+          The model: {tuned.plant_doubts_text}.
+        </p>
+      )}
       {tuned && !tuned.feasible && <NotFeasible tuned={tuned} on_ask={on_ask} />}
       {!tuned && own?.law === null && (
         <p class="design-caution design-note">

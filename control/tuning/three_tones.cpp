@@ -1,5 +1,5 @@
 // One least-squares fit of duty and acceleration, then a ratio at each tone.
-#include "control/identification/three_tones.hpp"
+#include "control/tuning/three_tones.hpp"
 
 #include <Eigen/Dense>
 #include <cmath>

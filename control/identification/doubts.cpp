@@ -1,0 +1,91 @@
+// Reads the doubts off a fit, and words them.
+#include "control/identification/doubts.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <sstream>
+
+#include "control/identification/amplitude_doubt.hpp"
+#include "control/identification/identifiability.hpp"
+
+namespace control {
+namespace {
+
+constexpr double kWholeRun = 0.999;
+
+void add_search(const Fit& fit, std::vector<Doubt>& doubts) {
+  if (fit.end == SearchEnd::converged) return;
+  doubts.push_back({DoubtCode::search_not_converged, fit.iterations, {}, std::nullopt});
+}
+
+void add_residuals(const Fit& fit, const std::optional<ScoreEvidence>& amplitude, std::vector<Doubt>& doubts) {
+  if (changes_with_amplitude(amplitude)) {
+    doubts.push_back({DoubtCode::no_linear_model_over_amplitude, amplitude->share, {}, amplitude->widening});
+  }
+  if (!fit.residuals_are_white) {
+    doubts.push_back({DoubtCode::residuals_not_white, fit.colour_factor, {}, fit.colour_factor});
+  }
+  if (fit.drift_factor > 1) doubts.push_back({DoubtCode::residuals_drift, fit.drift_factor, {}, fit.drift_factor});
+}
+
+std::string rounded(double value, int digits) {
+  std::ostringstream text;
+  text.precision(digits);
+  text << value;
+  return text.str();
+}
+
+}  // namespace
+
+bool is_grave(const Doubt& doubt) { return !doubt.widening || *doubt.widening > kGraveWidening; }
+
+std::string in_words(const Doubt& doubt) {
+  const double value = doubt.value.value_or(0);
+  switch (doubt.code) {
+    case DoubtCode::search_not_converged:
+      return "the search did not converge: the parameters are the best after " + rounded(value, 6) + " iterations";
+    case DoubtCode::no_linear_model_over_amplitude:
+      return "no linear model holds over the amplitudes of the run: ones that follow duty and speed explain " +
+             rounded(100 * value, 2) + " % of what the model leaves";
+    case DoubtCode::runs_disagree:
+      return "the runs do not agree on one model: parameters of their own explain " + rounded(100 * value, 2) +
+             " % of what the common ones leave";
+    case DoubtCode::residuals_not_white:
+      return "the residuals are not white: the sigmas are too small by a factor of " + rounded(value, 2);
+    case DoubtCode::residuals_drift:
+      return "the residuals drift: the sigmas are too small by a factor of " + rounded(value, 2);
+    case DoubtCode::parameter_not_determined:
+      return doubt.parameter + " is not determined: one sigma is " +
+             (doubt.value ? rounded(value, 2) : std::string{"without bound"});
+    case DoubtCode::parameter_at_bound: return doubt.parameter + " = " + rounded(value, 6) + " lies at its bound";
+    case DoubtCode::part_of_run_used: return "the fit used " + rounded(100 * value, 2) + " % of the run";
+  }
+  return "a doubt that this version does not know";
+}
+
+std::optional<double> widening(std::span<const Doubt> doubts) {
+  double square = 1;
+  for (const Doubt& doubt : doubts) {
+    if (!doubt.widening) return std::nullopt;
+    square += *doubt.widening * *doubt.widening - 1;
+  }
+  return std::sqrt(square);
+}
+
+std::vector<Doubt> doubts_about(const Fit& fit, const std::optional<ScoreEvidence>& amplitude, double share_used) {
+  std::vector<Doubt> doubts;
+  add_search(fit, doubts);
+  add_residuals(fit, amplitude, doubts);
+  for (const std::size_t i : undetermined_parameters(fit)) {
+    std::optional<double> sigma = fit.one_sigma[i];
+    if (sigma && !is_order(i)) *sigma /= parameters_of(fit.model)[i];
+    doubts.push_back({DoubtCode::parameter_not_determined, sigma, kParameterNames[i]});
+  }
+  for (const std::size_t i : parameters_at_bound(fit)) {
+    doubts.push_back({DoubtCode::parameter_at_bound, parameters_of(fit.model)[i], kParameterNames[i]});
+  }
+  if (share_used < kWholeRun) doubts.push_back({DoubtCode::part_of_run_used, share_used});
+  return doubts;
+}
+
+}  // namespace control

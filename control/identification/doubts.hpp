@@ -1,0 +1,52 @@
+// What an identification doubts of its own result, as codes with numbers, and by how much that widens what is computed
+// from the model.
+//
+//   w = √(1 + share · n/k)        what the linear model lacks, against what its k parameters cost             (1)
+//   w = √(n/n_effective)          residuals of which neighbours are alike: (7) of fit_statistics.hpp          (2)
+//   w = √R                        residuals that drift: (8) of fit_statistics.hpp                             (3)
+//   widening = √(1 + Σ (w² - 1))                                                                              (4)
+//
+// w is what the sd of the model's output over the run is multiplied by when the doubt is counted. White residuals of sd
+// s give that output an rms sd of s √(k/n); a share of their squares that the model could have explained is an error of
+// s √share beside it: (1). A doubt is grave if w > 2: by its size, never by a p-value alone. A fit whose sd nobody
+// knows (its search did not converge) has no w, and is grave. Errors: none thrown.
+#pragma once
+
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "control/search/fit.hpp"
+
+namespace control {
+
+inline constexpr double kGraveWidening = 2;
+
+enum class DoubtCode {
+  search_not_converged,            // value: iterations of the best start
+  no_linear_model_over_amplitude,  // value: the share of (1)
+  runs_disagree,                   // value: the share of (1)
+  residuals_not_white,             // value: w
+  residuals_drift,                 // value: w
+  parameter_not_determined,        // value: one sigma, of kp, b1 and b2 relative to the parameter
+  parameter_at_bound,              // value: the parameter
+  part_of_run_used,                // value: the share of the run's time that the fit used
+};
+
+struct Doubt {
+  DoubtCode code = DoubtCode::search_not_converged;
+  std::optional<double> value;         // as the code says; none: without bound
+  std::string parameter = {};          // its name, of a doubt about one
+  std::optional<double> widening = 1;  // w; none: not known
+};
+
+bool is_grave(const Doubt& doubt);
+std::string in_words(const Doubt& doubt);  // with the value; no full stop
+
+std::optional<double> widening(std::span<const Doubt> doubts);  // (4); none: not known
+
+// share_used: of the run's ticks.
+std::vector<Doubt> doubts_about(const Fit& fit, const std::optional<ScoreEvidence>& amplitude, double share_used);
+
+}  // namespace control
