@@ -17,8 +17,8 @@ inline constexpr int kFailed = 1;
 inline constexpr ExitStatus kExitStatuses[] = {
     {0, "done"},
     {kFailed,
-     "an error, with one line on standard error; verify: faults were found; reproduce: a file is damaged or a number "
-     "differs"},
+     "an error, with one line on standard error; identify: also a search that reached --time-limit-s, which "
+     "leaves no model; verify: faults were found; reproduce: a file is damaged or a number differs"},
     {2,
      "the command line is wrong: an unknown command or option, a value that is not allowed, options that exclude each "
      "other; verify, reproduce: the file is not what the command reads"},
