@@ -1,5 +1,5 @@
-// What an identification doubts of its own result, as codes with numbers, and by how much that widens what is computed
-// from the model.
+// The doubts of an identification about its own result, as codes with numbers, and the factor by which each widens what
+// is computed from the model.
 //
 //   w = √(1 + share · n/k)        what the linear model lacks, against what its k parameters cost             (1)
 //   w = √(n/n_effective)          residuals of which neighbours are alike: (7) of fit_statistics.hpp          (2)

@@ -62,7 +62,7 @@ struct Identification {
   std::vector<JointRun> runs;              // of several recordings, in their order; empty: there was one
 };
 
-// Of a search that has reached its time limit.
+// The result of a search that has reached its time limit: no model.
 Identification out_of_time();
 
 Identification identify(const Recording& recording, const IdentificationOptions& options);

@@ -26,7 +26,7 @@ struct Block {
   double values = 0;  // that count
 };
 
-// Of what is known of the sensors beside the readings.
+// A block for each run whose sensor has a prior beside its readings.
 std::vector<Block> priors(JointSearch& search, Structure structure, const JointResult& found) {
   std::vector<Block> all;
   for (std::size_t i = 0; i < search.runs(); ++i) {

@@ -49,8 +49,8 @@ struct Progress {
   double sse = 0;
 };
 
-// What the reader of a warning calls an option, for the advice in it: "--dead-time-s". Empty: the reader cannot give
-// it, and no advice names it.
+// The names of options for the advice in a warning, as its reader gives them: "--dead-time-s". Empty: the reader cannot
+// give the option, and no advice names it.
 struct OptionNames {
   std::string dead_time, sensor_lag, offset, structure;
 };
@@ -126,8 +126,8 @@ struct Fit {
   std::optional<SensorFit> sensor;                 // of a fit of the acceleration
 };
 
-// Of a score test: what further parameters would explain. Ones that change with amplitude (amplitude_doubt.hpp), or of
-// each run its own (joint_fit.hpp).
+// A score test's answer to what further parameters would explain: ones that change with amplitude
+// (amplitude_doubt.hpp), or of each run its own (joint_fit.hpp).
 struct ScoreEvidence {
   double share = 0;     // of the squares of the residuals, that they explain
   double f = 0;         // about 1 where nothing changes

@@ -44,7 +44,7 @@ class JointSearch {
   std::size_t longest() const { return longest_; }  // of the runs, by its samples
   OutputErrorSearch& of_run(std::size_t run) { return *searches_[run]; }
 
-  // Of recorded accelerations, before the first run().
+  // The same for each recorded acceleration. Call it before the first run().
   void find_sensors();
   // With no time at all the result is the paper's start.
   JointResult run(Structure structure);

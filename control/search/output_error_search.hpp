@@ -59,7 +59,7 @@ class OutputErrorSearch {
   // With no time at all the result is the paper's start.
   SearchResult run(Structure structure);
 
-  // Of a recorded acceleration, before the first run(): which sample each tick reads.
+  // Finds which sample each tick of a recorded acceleration reads. Call it before the first run().
   void find_sensor();
   std::optional<SensorFit> sensor_fit(const SearchPoint& point);  // none: no acceleration was recorded
   double sensor_lag_s(const SearchPoint& point) const;            // dead time and all, its sampling aside
@@ -90,7 +90,8 @@ class OutputErrorSearch {
   std::vector<Eigen::VectorXd> residuals(const SearchPoint& point);
   // Of the outputs with respect to ln kp, ln b1, ln b2, alpha, beta, offset, dead time, as far as they are free.
   std::vector<Eigen::MatrixXd> jacobians(Structure structure, const SearchPoint& point);
-  // Of the sensor, once it is found: (6) of each of its free parameters in sds, and the slopes by the free parameters.
+  // The prior of the sensor, once it is found: (6) of each of its free parameters in sds, and its slopes by the free
+  // parameters.
   Eigen::VectorXd prior_residuals(Structure structure, const SearchPoint& point) const;
   Eigen::MatrixXd prior_slopes(Structure structure, const SearchPoint& point) const;
   double reading_sd_m_s2() const { return reading_sd_m_s2_; }  // of the noise in which (6) counts

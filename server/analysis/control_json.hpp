@@ -35,7 +35,7 @@ Result<control::FopdController> controller_from(const nlohmann::json& value);
 // was written by hand. The dead time is taken as known.
 Result<std::optional<control::ExpectedUncertainty>> uncertainty_from(const nlohmann::json& fit);
 
-// What an identification doubts of its model.
+// The doubts of an identification about its model.
 struct ModelDoubts {
   bool is_of_fit = false;  // else the model was written by hand
   bool are_known = false;  // false: by hand, or a version that did not say has made it

@@ -47,7 +47,8 @@ OrderedJson quality_json(const control::Fit& fit) {
           {"whiteness_p_value", fit.whiteness_p_value}};
 }
 
-// Of a search, or of the same for the sensor of data on which a model is tried.
+// The refusal of a search that has reached its limit, also of the search for the sensor of data on which a model is
+// tried.
 Error out_of_time(double time_limit_s) {
   return {
       ErrorCode::conflict,
@@ -58,7 +59,7 @@ Error out_of_time(double time_limit_s) {
       {}};
 }
 
-// Of a model on other data; the error: its time ran out.
+// The quality of a model on other data; the error: its time ran out.
 Result<OrderedJson> quality_on(const RunOfMany& run, const control::FractionalModel& model,
                                const IdentifyRequest& request) {
   const control::Fit fit = control::evaluate(model, run.recorded.recording, request.search);

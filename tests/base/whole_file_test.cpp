@@ -40,7 +40,7 @@ TEST_F(WholeFileTest, IsReadUpToTheBoundAndNotBeyond) {
   EXPECT_EQ(read_whole(saved(""), 10).problem, "");
 }
 
-// More than there is memory for: whoever began to read it would not come to an end.
+// More than there is memory for: a program that began to read it would not come to an end.
 TEST_F(WholeFileTest, ThatIsTooLongIsNotBegun) {
   fs::resize_file(saved("x"), std::uintmax_t{1} << 40);
   EXPECT_EQ(read_whole(folder_ / "file", std::size_t{1} << 39).problem, "has more than 549755813888 bytes");

@@ -113,7 +113,7 @@ TEST(SensorSearch, NamesAnOptionOnlyToThoseWhoHaveIt) {
   EXPECT_THAT(identify(run, options).warnings, Contains(HasSubstr("search for the dead time (--dead-time-s)")));
 }
 
-// Of a run in which the sensor hardly shows: a short step.
+// A short step is a run in which the sensor hardly shows.
 TEST(SensorSearch, TheDataSheetCountsInTheSigmas) {
   Recording run = acceleration_run(6, 0.05, 0);
   OutputErrorSearch search(run, one_start());

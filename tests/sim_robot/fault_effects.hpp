@@ -56,7 +56,7 @@ class FaultEffects : public LinkStory {
     ASSERT_TRUE(reached_auto(0.5F));
   }
   std::uint64_t inject(const Fault& fault) { return faults.inject(fault, faulty()); }
-  // On so many connections since the beginning, or more.
+  // The link has connected at least this often since the beginning, and the station has every sample.
   bool is_back(int connections = 1) {
     return run_until([&] { return link->connections() >= connections && caught_up(); }, 10);
   }

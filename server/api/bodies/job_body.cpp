@@ -66,8 +66,8 @@ Result<void> read_window(const Members& body, const WindowNames& names, analysis
       "out_of_range");
 }
 
-// How whoever reads a warning can give what it advises, wherever it is read: on the page, or of autotune, which asks
-// for a job without these.
+// The names under which a reader of a job's warnings can give the options that they advise. A reader is at the page, or
+// at autotune, which begins its job without these options.
 const control::OptionNames kAdvice{"rheonaut identify --dead-time-s; dead_time_s of a job",
                                    "rheonaut identify --sensor-lag-s; sensor_lag_s of a job",
                                    "rheonaut identify --offset; fits_offset of a job", "a structure that is given"};

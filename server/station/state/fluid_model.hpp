@@ -23,7 +23,7 @@ inline constexpr float kMaxModelTimeConstant_s = 1000;
 // Of the final velocity. SAFETY: with a model that fits worse a robot is surer of its position than it may be.
 inline constexpr double kMaxModelFitError = 0.005;
 // sd of each gain by itself, a share of their sum, of a model that is assumed only: at least that of a robot that
-// nobody told its fluid (docs/robot.md). SAFETY: a robot whose model is in doubt is as unsure as one without.
+// does not know its fluid (docs/robot.md). SAFETY: a robot whose model is in doubt is as unsure as one without.
 inline constexpr float kAssumedSectionError = 0.12F;
 
 struct FluidModel {
