@@ -1,5 +1,5 @@
 PRAGMA application_id = 1382573423;
-PRAGMA user_version = 12;
+PRAGMA user_version = 13;
 BEGIN;
 CREATE TABLE api_token (
   name TEXT PRIMARY KEY,

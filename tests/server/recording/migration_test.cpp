@@ -66,6 +66,22 @@ TEST(Migrations, AreFilesThatAreNumberedFromOne) {
   EXPECT_GE(number, 7U);
 }
 
+// A file that a station wrote has run the scripts of its version: what comes after is a script of its own. A new one is
+// added to the list, by sha256sum.
+TEST(Migrations, StayAsTheyWere) {
+  std::ifstream list{std::filesystem::path{TEST_DATA_DIR} / "recording/migrations.sha256"};
+  for (const base::EmbeddedFile& script : storage::migration_files()) {
+    std::string sha256;
+    std::string name;
+    list >> sha256 >> name;
+    EXPECT_EQ(name, script.name);
+    EXPECT_EQ(script.digest, sha256.substr(0, script.digest.size()))
+        << script.name << " differs from what was released: add a file";
+  }
+  std::string more;
+  EXPECT_FALSE(list >> more) << more;
+}
+
 TEST_F(MigrationTest, EveryRunOfVersion1ReadsTheSame) {
   make_version_1();
   const std::vector<std::string> before = runs_as_read();

@@ -1,7 +1,7 @@
 -- The twelfth migration: how many ticks of a run the robot missed, which robots are owed rest, which parts of runs were
--- interrupted, since when a token has expired, and which models of fluids are in doubt.
+-- interrupted, and since when a token has expired.
 --
--- It adds four columns, a table and an index: no row is rewritten. A digest of an older version has NULL there until the
+-- It adds three columns, a table and an index: no row is rewritten. A digest of an older version has NULL there until the
 -- station has counted them from the heads of its segments; what a digest hashes stays.
 ALTER TABLE run_certificate ADD COLUMN missed_ticks INTEGER;          -- at which the robot made no sample; NULL: not counted
 ALTER TABLE run_certificate ADD COLUMN longest_missed_ticks INTEGER;  -- in a row
@@ -12,8 +12,6 @@ CREATE TABLE rest_owed (              -- robots that move in a name whose right 
   why TEXT NOT NULL,                  -- what has ended the right
   since_us INTEGER NOT NULL
 ) WITHOUT ROWID;
-
-ALTER TABLE fluid_model ADD COLUMN assumed_because TEXT NOT NULL DEFAULT '';  -- the grave doubts: robots are sent it as assumed
 
 ALTER TABLE api_token ADD COLUMN expired_at_us INTEGER NOT NULL DEFAULT 0;  -- since when it is refused; 0: it is not
 
