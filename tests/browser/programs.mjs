@@ -6,6 +6,7 @@ import { createRequire } from 'node:module';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { setTimeout as delay } from 'node:timers/promises';
+import { feel_clicks } from './felt_clicks.mjs';
 
 export const bin = process.env.RHEONAUT_BIN ?? new URL('../../build/dev/bin', import.meta.url).pathname;
 const kFleetConfig = new URL('../../deploy/fleet.toml', import.meta.url).pathname; // a whole fleet may enrol itself
@@ -153,7 +154,9 @@ export class Bench {
     const context = await this.browser.newContext(options);
     this.contexts.push(context);
     context.setDefaultTimeout(kLongestWait_ms);
-    return context.newPage();
+    const page = await context.newPage();
+    await feel_clicks(context, page);
+    return page;
   }
 
   async open_browser(options) {
