@@ -134,7 +134,7 @@ class Section5Test : public PaperTest {
     }
     const control::StepMetrics step = true_step(perform("figure_7"), 0).measured;
     const json& predicted = tuned.at("predicted").at(0).at("step");
-    EXPECT_NEAR(step.settling_s.value_or(0), predicted.at("settling_s"), 0.15);
+    EXPECT_NEAR(step.settling_s.value_or(0), predicted.at("settling_s"), 0.155);  // both are whole ticks of 0.01 s
     EXPECT_NEAR(step.overshoot_percent, predicted.at("overshoot_percent"), 1);
   }
 
