@@ -7,11 +7,13 @@
 
 #include "control/identification/amplitude_doubt.hpp"
 #include "control/identification/identifiability.hpp"
+#include "control/sensor/sensor_prior.hpp"
 
 namespace control {
 namespace {
 
 constexpr double kWholeRun = 0.999;
+constexpr double kSmallestDeadTimeSdS = 0.0005;
 
 void add_search(const Fit& fit, std::vector<Doubt>& doubts) {
   if (fit.end == SearchEnd::converged) return;
@@ -58,6 +60,10 @@ std::string in_words(const Doubt& doubt) {
       return doubt.parameter + " is not determined: one sigma is " +
              (doubt.value ? rounded(value, 2) : std::string{"without bound"});
     case DoubtCode::parameter_at_bound: return doubt.parameter + " = " + rounded(value, 6) + " lies at its bound";
+    case DoubtCode::dead_time_not_determined:
+      return doubt.value ? "the age of the readings hides a part of the dead time: one sigma of it is " +
+                               rounded(1e3 * value, 2) + " ms"
+                         : "the dead time is not determined: it lies at the limit of the search";
     case DoubtCode::part_of_run_used: return "the fit used " + rounded(100 * value, 2) + " % of the run";
   }
   return "a doubt that this version does not know";
@@ -70,6 +76,11 @@ std::optional<double> widening(std::span<const Doubt> doubts) {
     square += *doubt.widening * *doubt.widening - 1;
   }
   return std::sqrt(square);
+}
+
+double dead_time_sd_s(std::span<const Doubt> doubts) {
+  const auto found = std::ranges::find(doubts, DoubtCode::dead_time_not_determined, &Doubt::code);
+  return found == doubts.end() ? 0 : found->value.value_or(0);
 }
 
 std::vector<Doubt> doubts_about(const Fit& fit, const std::optional<ScoreEvidence>& amplitude, double share_used) {
@@ -86,6 +97,17 @@ std::vector<Doubt> doubts_about(const Fit& fit, const std::optional<ScoreEvidenc
   }
   if (share_used < kWholeRun) doubts.push_back({DoubtCode::part_of_run_used, share_used});
   return doubts;
+}
+
+std::optional<Doubt> dead_time_doubt(const Fit& fit, const IdentificationOptions& options, double dt_s) {
+  if (!fit.sensor || fit.starts == 0) return std::nullopt;
+  if (fit.sensor->delay_is_at_limit) return Doubt{DoubtCode::dead_time_not_determined, std::nullopt, {}, std::nullopt};
+  const double late_s = std::max(0.0, fit.sensor->delay_s - dt_s / 2);
+  const double of_lag_s = options.sensor_lag_s ? 0 : std::min(kLagSdS, late_s);
+  const double of_age_s = fit.sensor->has_own_clock ? 0 : dt_s / std::sqrt(12.0);
+  const double sd_s = std::hypot(of_lag_s, of_age_s);
+  if (sd_s < kSmallestDeadTimeSdS) return std::nullopt;
+  return Doubt{DoubtCode::dead_time_not_determined, sd_s};
 }
 
 }  // namespace control

@@ -32,6 +32,7 @@ enum class DoubtCode {
   parameter_not_determined,        // value: one sigma, of kp, b1 and b2 relative to the parameter
   parameter_at_bound,              // value: the parameter
   part_of_run_used,                // value: the share of the run's time that the fit used
+  dead_time_not_determined,        // value: its sd in s, beside what the fit says; none: at the limit of the search
 };
 
 struct Doubt {
@@ -48,5 +49,12 @@ std::optional<double> widening(std::span<const Doubt> doubts);  // (4); none: no
 
 // share_used: of the run's ticks.
 std::vector<Doubt> doubts_about(const Fit& fit, const std::optional<ScoreEvidence>& amplitude, double share_used);
+
+double dead_time_sd_s(std::span<const Doubt> doubts);  // 0: none is in doubt
+
+// Of an acceleration: a dead time and the age of the readings look the same. In doubt is the sensor's own lag, if it
+// was not given, by (2) of sensor_prior.hpp or by the whole delay where that is shorter, and of samples in step with
+// the ticks when within a tick they were taken, dt/√12. It widens no response, and is the sd of a dead time: w = 1.
+std::optional<Doubt> dead_time_doubt(const Fit& fit, const IdentificationOptions& options, double dt_s);
 
 }  // namespace control

@@ -27,17 +27,8 @@ double best_offset_m(OutputErrorSearch& search, const SearchPoint& point) {
   return slope.dot(search.residuals(point).front()) / slope.squaredNorm();
 }
 
-}  // namespace
-
-Identification out_of_time() {
-  Identification none;
-  none.best.end = SearchEnd::time_limit;
-  return none;
-}
-
-Identification identify(const Recording& recording, const IdentificationOptions& options) {
-  check_recording(recording);
-  check_options(options, recording);
+// With the dead time that the options have, or none.
+Identification identified(const Recording& recording, const IdentificationOptions& options) {
   OutputErrorSearch search(recording, options);
   std::vector<Structure> structures{Structure::first_order, Structure::second_order, Structure::fractional};
   if (options.structure) structures = {*options.structure};
@@ -69,7 +60,27 @@ Identification identify(const Recording& recording, const IdentificationOptions&
   add_rival(result.compared, warnings);
   if (search.limit().has_passed()) return out_of_time();  // a doubt may be missing
   result.doubts = doubts_about(result.best, result.amplitude, share_used({&recording, 1}));
+  if (auto doubt = dead_time_doubt(result.best, options, recording.dt_s)) result.doubts.push_back(std::move(*doubt));
   return result;
+}
+
+}  // namespace
+
+Identification out_of_time() {
+  Identification none;
+  none.best.end = SearchEnd::time_limit;
+  return none;
+}
+
+Identification identify(const Recording& recording, const IdentificationOptions& options) {
+  check_recording(recording);
+  check_options(options, recording);
+  const double deadline_s = steady_now_s() + options.time_limit_s;
+  Identification found = identified(recording, options);
+  if (!asks_for_dead_time(recording, options, found.best)) return found;
+  Identification late = identified(recording, with_dead_time(options, recording, deadline_s - steady_now_s()));
+  if (late.best.end == SearchEnd::time_limit) return late;
+  return is_explained_better(late.best, found.best) ? late : found;
 }
 
 Fit evaluate(const FractionalModel& model, const Recording& recording, const IdentificationOptions& options) {

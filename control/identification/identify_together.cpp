@@ -69,11 +69,8 @@ void add_runs(JointSearch& search, std::span<const Recording> recordings, const 
   }
 }
 
-}  // namespace
-
-Identification identify_together(std::span<const Recording> recordings, const IdentificationOptions& options) {
-  if (recordings.size() == 1) return identify(recordings.front(), options);
-  check_together(recordings, options);
+// With the dead time that the options have, or none.
+Identification identified(std::span<const Recording> recordings, const IdentificationOptions& options) {
   JointSearch search(recordings, options);
   std::vector<Structure> structures{Structure::first_order, Structure::second_order, Structure::fractional};
   if (options.structure) structures = {*options.structure};
@@ -106,7 +103,29 @@ Identification identify_together(std::span<const Recording> recordings, const Id
   if (disagreeing) {
     result.doubts.push_back({DoubtCode::runs_disagree, disagreeing->share, {}, disagreeing->widening});
   }
+  if (auto doubt = dead_time_doubt(result.runs[longest].fit, options, recordings[longest].dt_s)) {
+    result.doubts.push_back(std::move(*doubt));
+  }
   return result;
+}
+
+}  // namespace
+
+Identification identify_together(std::span<const Recording> recordings, const IdentificationOptions& options) {
+  if (recordings.size() == 1) return identify(recordings.front(), options);
+  check_together(recordings, options);
+  const double deadline_s = steady_now_s() + options.time_limit_s;
+  Identification found = identified(recordings, options);
+  bool asks = false;
+  for (std::size_t i = 0; i < found.runs.size(); ++i) {
+    asks = asks || asks_for_dead_time(recordings[i], options, found.runs[i].fit);
+  }
+  if (!asks) return found;
+  const Recording& shortest = *std::ranges::min_element(
+      recordings, {}, [](const Recording& one) { return one.dt_s * static_cast<double>(one.duty.size()); });
+  Identification late = identified(recordings, with_dead_time(options, shortest, deadline_s - steady_now_s()));
+  if (late.best.end == SearchEnd::time_limit) return late;
+  return is_explained_better(late.best, found.best) ? late : found;
 }
 
 }  // namespace control

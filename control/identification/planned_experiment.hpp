@@ -27,6 +27,7 @@ struct PlannedExperiment {
 struct ExpectedUncertainty {
   std::array<std::optional<double>, kParameters> one_sigma;  // none: this experiment does not determine it
   std::array<std::array<double, kParameters>, kParameters> correlation{};
+  double dead_time_sd_s = 0;  // taken as independent of the parameters; of a planned experiment it is known
 };
 
 ExpectedUncertainty expected_uncertainty(const FractionalModel& model, const PlannedExperiment& experiment);

@@ -13,6 +13,7 @@
 #include "control/identification/residual_doubts.hpp"
 #include "control/search/fit_statistics.hpp"
 #include "control/search/missed_ticks.hpp"
+#include "control/sensor/sensor_prior.hpp"
 
 namespace control {
 namespace {
@@ -24,6 +25,9 @@ constexpr double kClearlyLowerAic = 10;
 constexpr std::ptrdiff_t kFewest = 20;                    // samples of the beginning
 constexpr double kRoughBeginning = 3;                     // times the size of the other residuals, by the medians
 constexpr double kNoticeableLagS = 0.002;                 // twice what the age of the samples is known to
+constexpr double kLagsOfTheSensor = 2;                    // sds of its own lag that a delay is not called a dead time
+constexpr double kLongestTriedS = 0.2;                    // of dead times that nobody named
+constexpr double kAsSmall = 1.02;                         // of residuals, relative
 constexpr double kMotionSigmas = 5, kMotionShare = 0.01;  // of v0, and of the squares that it explains
 constexpr double kNoticeableRows = 0.3;                   // of a duty that is shifted, to first order
 
@@ -312,6 +316,31 @@ std::vector<std::string> lag_doubts(const Recording& recording, const Identifica
   text << "the readings come up to " << 1e3 * at_most_s << " ms later than the sensor's own lag explains: that is a "
        << "dead time, and the model has none; search for it" << in_brackets(options.names.dead_time);
   return {text.str()};
+}
+
+bool asks_for_dead_time(const Recording& recording, const IdentificationOptions& options, const Fit& fit) {
+  if (!options.tries_dead_time || options.longest_dead_time_s > 0 || fit.starts == 0) return false;
+  if (fit.end == SearchEnd::cancelled) return false;
+  if (!fit.sensor) return recording.position_time_s.empty() && !fit.residuals_are_white;  // no clock that may be off
+  if (fit.sensor->delay_is_at_limit) return true;
+  const double age_s = fit.sensor->has_own_clock ? recording.dt_s / 2 : recording.dt_s;  // at most
+  const double late_s = fit.sensor->delay_s - age_s - options.sensor_lag_s.value_or(0);
+  return late_s > (options.sensor_lag_s ? kNoticeableLagS : kLagsOfTheSensor * kLagSdS);
+}
+
+IdentificationOptions with_dead_time(IdentificationOptions options, const Recording& shortest, double left_s) {
+  const double duration_s = shortest.dt_s * static_cast<double>(shortest.duty.size());
+  options.longest_dead_time_s = std::min(kLongestTriedS, duration_s / 4);
+  options.time_limit_s = left_s;
+  return options;
+}
+
+bool is_explained_better(const Fit& with_dead_time, const Fit& without) {
+  if (!(with_dead_time.model.dead_time_s > 0)) return false;
+  // The delay of readings that were late has become the plant's: with as many parameters the residuals are as small.
+  // How many readings are left out differs, so that no AIC tells.
+  if (without.sensor) return with_dead_time.residual_sd < kAsSmall * without.residual_sd;
+  return with_dead_time.aic < without.aic - kClearlyLowerAic;
 }
 
 std::vector<std::string> second_opinions(OutputErrorSearch& search, const Recording& recording,

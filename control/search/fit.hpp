@@ -60,6 +60,7 @@ struct IdentificationOptions {
   Cost cost = Cost::least_squares;
   bool fits_offset = true;                           // the initial position is unknown, where position is recorded
   double longest_dead_time_s = 0;                    // 0: no dead time; else it is found in [0, this]
+  bool tries_dead_time = false;                      // one is looked for where the record asks for it, if that is 0
   int further_starts = 4;                            // beside the paper's
   int iteration_limit = 200;                         // per start
   double time_limit_s = 300;                         // in all; what reaches it has no result

@@ -1,7 +1,7 @@
 // What is known of an accelerometer before its readings are: the figures of its data sheet, each with an sd.
 //
 //   ln(τ/τ_0) ~ N(0, kLowPassSd),  τ_0 = 1/(2π 62.5 Hz)                 (1)   [bno055] bandwidth of the fusion
-//   lag of a sample ~ N(0 or the lag that is given, kLagSdS)            (2)   one period of its output, 10 ms
+//   lag of a sample ~ N(0 or the lag that is given, kLagSdS)            (2)   half a period of its output, 10 ms
 //   P/dt - 1 ~ N(0, kClockSd)                                           (3)   its oscillator
 //
 // (1) decides: a record of a minute knows τ to 0.7 ms only, and a low pass that is too short looks like orders that are
@@ -17,7 +17,7 @@ namespace control {
 inline constexpr double kDataSheetBandwidthHz = 62.5;
 inline constexpr double kDataSheetTimeConstantS = 1 / (2 * std::numbers::pi * kDataSheetBandwidthHz);  // 2.55 ms
 inline constexpr double kLowPassSd = 0.1;
-inline constexpr double kLagSdS = 0.01;
+inline constexpr double kLagSdS = 0.005;
 inline constexpr double kClockSd = 0.005;
 
 }  // namespace control

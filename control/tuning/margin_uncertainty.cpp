@@ -44,7 +44,9 @@ MarginUncertainty margin_uncertainty(const OpenLoop& loop, double gain_crossover
     log_crossover[i] = -change.real() / of_loop.log_slope.real();  // (2)
     phase_rad[i] = change.imag() + of_loop.log_slope.imag() * log_crossover[i];
   }
-  return {sd_of(phase_rad, plant) * kDegPerRad, sd_of(log_crossover, plant) * gain_crossover_rad_s};
+  const double of_dead_time_rad = gain_crossover_rad_s * plant.dead_time_sd_s;
+  return {std::hypot(sd_of(phase_rad, plant), of_dead_time_rad) * kDegPerRad,
+          sd_of(log_crossover, plant) * gain_crossover_rad_s};
 }
 
 }  // namespace control

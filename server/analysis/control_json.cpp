@@ -156,6 +156,9 @@ Result<std::optional<control::ExpectedUncertainty>> uncertainty_from(const json&
       *known.one_sigma[i] *= *widening;
     }
     known.correlation = fit.at("correlation").get<decltype(known.correlation)>();
+    const json& searched = fit.value("dead_time_sigma_s", json{});
+    known.dead_time_sd_s =
+        std::hypot(searched.is_null() ? 0 : searched.get<double>() * *widening, dead_time_sd_s(doubted->doubts));
     return known;
   } catch (const json::exception&) {
     return fail(

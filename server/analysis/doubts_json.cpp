@@ -17,10 +17,11 @@ namespace {
 
 constexpr std::size_t kMostDoubts = 32;
 constexpr double kNoticeable = 1.05;  // widening
-constexpr std::array kCodes{DoubtCode::search_not_converged, DoubtCode::no_linear_model_over_amplitude,
-                            DoubtCode::runs_disagree,        DoubtCode::residuals_not_white,
-                            DoubtCode::residuals_drift,      DoubtCode::parameter_not_determined,
-                            DoubtCode::parameter_at_bound,   DoubtCode::part_of_run_used};
+constexpr std::array kCodes{DoubtCode::search_not_converged,    DoubtCode::no_linear_model_over_amplitude,
+                            DoubtCode::runs_disagree,           DoubtCode::residuals_not_white,
+                            DoubtCode::residuals_drift,         DoubtCode::parameter_not_determined,
+                            DoubtCode::parameter_at_bound,      DoubtCode::part_of_run_used,
+                            DoubtCode::dead_time_not_determined};
 
 std::optional<double> number_or_none(const json& value) {
   return value.is_null() ? std::nullopt : std::optional{value.get<double>()};
@@ -54,6 +55,7 @@ const char* text(DoubtCode value) {
     case DoubtCode::parameter_not_determined: return "parameter_not_determined";
     case DoubtCode::parameter_at_bound: return "parameter_at_bound";
     case DoubtCode::part_of_run_used: return "part_of_run_used";
+    case DoubtCode::dead_time_not_determined: return "dead_time_not_determined";
   }
   return "unknown";
 }
@@ -101,13 +103,17 @@ std::string doubts_in_words(const ModelDoubts& known) {
   if (!known.are_known) {
     return known.is_of_fit ? "an earlier version has made this fit: what is in doubt about it is not known" : "";
   }
-  const auto widens = [](const Doubt& doubt) { return !doubt.widening || *doubt.widening > kNoticeable; };
-  const std::vector<std::string> words = words_of(known, widens);
+  const auto matters = [](const Doubt& doubt) {
+    return !doubt.widening || *doubt.widening > kNoticeable || doubt.code == DoubtCode::dead_time_not_determined;
+  };
+  std::vector<std::string> words = words_of(known, matters);
   if (words.empty()) return {};
   const auto widening = control::widening(known.doubts);
-  return fmt::format("in doubt: {}; {}", fmt::join(words, "; "),
-                     widening ? fmt::format("each ± that follows is widened {:.2g} times", *widening)
-                              : std::string{"no ± can be given for what follows"});
+  if (!widening)
+    words.emplace_back("no ± can be given for what follows");
+  else if (*widening > kNoticeable)
+    words.push_back(fmt::format("each ± that follows is widened {:.2g} times", *widening));
+  return fmt::format("in doubt: {}", fmt::join(words, "; "));
 }
 
 std::string grave_doubts_in_words(const ModelDoubts& known) {

@@ -56,7 +56,8 @@ std::vector<double> position_sd_of(const Profile& profile, const TimeLine& line,
   const auto positions = [&](const FractionalModel& model) {
     return preview_of(profile, line, model, controller).position_m;
   };
-  const std::size_t samples = positions(plant).size();
+  const std::vector<double> middle_m = positions(plant);
+  const std::size_t samples = middle_m.size();
   std::vector<std::vector<double>> deviations(control::kParameters);  // d_i of (1); empty: known
   for (std::size_t i = 0; i < control::kParameters; ++i) {
     const double sigma = uncertainty.one_sigma[i].value_or(0);
@@ -68,9 +69,15 @@ std::vector<double> position_sd_of(const Profile& profile, const TimeLine& line,
       deviations[i][k] = (high_m[k] - low_m[k]) / pair.distance * sigma;
     }
   }
+  std::vector<double> later_m;  // by one sd of the dead time
+  if (uncertainty.dead_time_sd_s > 0) {
+    FractionalModel late = plant;
+    late.dead_time_s += uncertainty.dead_time_sd_s;
+    later_m = positions(late);
+  }
   std::vector<double> sd_m(samples);
   for (std::size_t k = 0; k < samples; ++k) {
-    double variance_m2 = 0;
+    double variance_m2 = k < later_m.size() ? std::pow(later_m[k] - middle_m[k], 2) : 0;
     for (std::size_t i = 0; i < control::kParameters; ++i) {
       for (std::size_t j = 0; j < control::kParameters; ++j) {
         if (deviations[i].empty() || deviations[j].empty()) continue;

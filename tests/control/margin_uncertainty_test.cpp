@@ -43,9 +43,10 @@ class Spread {
   double sum_ = 0, squares_ = 0, count_ = 0;
 };
 
-void expect_spread_of_draws(const OpenLoop& loop) {
+void expect_spread_of_draws(const OpenLoop& loop, double dead_time_sd_s = 0) {
   const Margins middle = margins(loop);
-  const ExpectedUncertainty known = a_fit_of(loop.plant);
+  ExpectedUncertainty known = a_fit_of(loop.plant);
+  known.dead_time_sd_s = dead_time_sd_s;
   const Eigen::MatrixXd root = covariance_of(known).llt().matrixL();
   std::mt19937 random{4};
   std::normal_distribution<double> normal;
@@ -55,6 +56,7 @@ void expect_spread_of_draws(const OpenLoop& loop) {
     OpenLoop drawn = loop;
     drawn.plant.kp += by[0], drawn.plant.b1 += by[1], drawn.plant.b2 += by[2];
     drawn.plant.alpha += by[3], drawn.plant.beta += by[4];
+    if (dead_time_sd_s > 0) drawn.plant.dead_time_s += dead_time_sd_s * normal(random);
     const Margins found = margins(drawn);
     margin_deg.add(*found.phase_margin_deg - *middle.phase_margin_deg);
     crossover_rad_s.add(*found.gain_crossover_rad_s - *middle.gain_crossover_rad_s);
@@ -69,7 +71,9 @@ TEST(MarginUncertainty, IsTheSpreadOverPlantsThatAreDrawn) {
   expect_spread_of_draws({kNonNewtonianModel, kPaperController, true});
   FractionalModel late = kNonNewtonianModel;
   late.dead_time_s = 0.05;
-  expect_spread_of_draws({late, tune(late, {3, 80, 0.8, false}).tuned->controller, false});
+  const OpenLoop loop{late, tune(late, {3, 80, 0.8, false}).tuned->controller, false};
+  expect_spread_of_draws(loop);
+  expect_spread_of_draws(loop, 0.01);
 }
 
 // That is what iso-damping is for.

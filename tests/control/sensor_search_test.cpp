@@ -104,6 +104,31 @@ TEST(SensorSearch, ADeadTimeBeyondWhatTheReadingsMayHideIsNamedAndFound) {
   EXPECT_FALSE(found.best.sensor->delay_is_at_limit);
 }
 
+Identification identified_by_itself(double late_s, std::optional<double> sensor_lag_s) {
+  IdentificationOptions options = one_start();
+  options.tries_dead_time = true;
+  options.sensor_lag_s = sensor_lag_s;
+  return identify(acceleration_run(6, 0.002, 0, 0, late_s), options);
+}
+
+TEST(SensorSearch, ADeadTimeThatNobodyNamedIsFoundWhereTheReadingsComeLater) {
+  EXPECT_EQ(identified_by_itself(0, std::nullopt).best.model.dead_time_s, 0);
+  EXPECT_EQ(identified_by_itself(0.03, 0.03).best.model.dead_time_s, 0) << "the sensor is so late";
+  EXPECT_NEAR(identified_by_itself(0.03, std::nullopt).best.model.dead_time_s, 0.03, 0.003);
+  EXPECT_NEAR(identified_by_itself(0.03, 0.01).best.model.dead_time_s, 0.02, 0.003);
+  EXPECT_NEAR(identified_by_itself(0.12, std::nullopt).best.model.dead_time_s, 0.12, 0.003) << "beyond any lag";
+}
+
+TEST(SensorSearch, WhatTheAgeOfTheReadingsHidesIsTheDoubtOfTheDeadTime) {
+  const double of_age_s = 0.01 / std::sqrt(12.0);  // its samples keep step with the ticks
+  EXPECT_NEAR(dead_time_sd_s(identified_by_itself(0.03, std::nullopt).doubts), std::hypot(0.005, of_age_s), 1e-9);
+  EXPECT_NEAR(dead_time_sd_s(identified_by_itself(0.03, 0.01).doubts), of_age_s, 1e-9);
+  const Identification at_limit = identified(0.12, 0, std::nullopt);
+  EXPECT_TRUE(std::ranges::any_of(at_limit.doubts, [](const Doubt& doubt) {
+    return doubt.code == DoubtCode::dead_time_not_determined && is_grave(doubt);
+  }));
+}
+
 TEST(SensorSearch, NamesAnOptionOnlyToThoseWhoHaveIt) {
   const Recording run = acceleration_run(6, 0.002, 0, 0, 0.03);
   IdentificationOptions options = one_start();

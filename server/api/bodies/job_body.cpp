@@ -92,6 +92,7 @@ Result<void> read_search(const Members& body, control::IdentificationOptions& se
   if (const auto read = read_number(body, "time_limit_s", time_limit_s, search.time_limit_s); !read) return read;
   const Range<double> dead_time_s = numbers("IdentifyJobBody.dead_time_s");
   if (const auto read = read_number(body, "dead_time_s", dead_time_s, search.longest_dead_time_s); !read) return read;
+  search.tries_dead_time = !body.has("dead_time_s");
   const auto lag_s = body.optional_number("sensor_lag_s", numbers("IdentifyJobBody.sensor_lag_s"));
   if (!lag_s) return std::unexpected{lag_s.error()};
   search.sensor_lag_s = *lag_s;

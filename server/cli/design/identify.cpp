@@ -64,26 +64,6 @@ void add_source(CLI::App& command, Identify& options) {
                    "Also fit the velocity that the robot recorded, where its position is known");
 }
 
-void add_search(CLI::App& command, control::IdentificationOptions& options) {
-  using control::Cost;
-  using control::Structure;
-  add_word(command, "--structure", options.structure,
-           std::array{Structure::first_order, Structure::second_order, Structure::fractional},
-           "first_order, second_order or fractional (default: all three, the best by AIC)");
-  add_word(command, "--cost", options.cost, std::array{Cost::least_squares, Cost::absolute_error},
-           "least_squares or absolute_error (default: least_squares)");
-  command.add_flag("--offset,!--no-offset", options.fits_offset,
-                   "Whether the initial position is fitted too (default: it is, where position is recorded)");
-  command.add_option("--dead-time-s", options.longest_dead_time_s, "Find a dead time up to this (default: 0, none)")
-      ->check(non_negative());
-  command
-      .add_option("--sensor-lag-s", options.sensor_lag_s,
-                  "Of a fitted acceleration: the sensor's own lag, beyond sampling and low pass; what comes later is "
-                  "a dead time (default: not known)")
-      ->check(non_negative());
-  command.add_option("--time-limit-s", options.time_limit_s, "Of the search (default: 300)")->check(positive());
-}
-
 void add_plan(CLI::App& command, Identify& options) {
   Plan& plan = options.plan;
   auto* flag = command.add_flag("--plan", plan.is_wanted, "No recording: what an experiment would tell about --plant");
@@ -267,6 +247,47 @@ std::vector<std::string> unexplained_runs(std::span<const analysis::RunOfMany> r
 }
 
 }  // namespace
+
+void add_search(CLI::App& command, control::IdentificationOptions& options) {
+  using control::Cost;
+  using control::Structure;
+  add_word(command, "--structure", options.structure,
+           std::array{Structure::first_order, Structure::second_order, Structure::fractional},
+           "first_order, second_order or fractional (default: all three, the best by AIC)");
+  add_word(command, "--cost", options.cost, std::array{Cost::least_squares, Cost::absolute_error},
+           "least_squares or absolute_error (default: least_squares)");
+  command.add_flag("--offset,!--no-offset", options.fits_offset,
+                   "Whether the initial position is fitted too (default: it is, where position is recorded)");
+  command
+      .add_option("--dead-time-s", options.longest_dead_time_s,
+                  "Find a dead time up to this; 0: none (default: up to 0.2, where the record asks for one)")
+      ->check(non_negative())
+      ->each([&options](const std::string&) { options.tries_dead_time = false; });
+  command
+      .add_option("--sensor-lag-s", options.sensor_lag_s,
+                  "Of a fitted acceleration: the sensor's own lag, beyond sampling and low pass; what comes later is "
+                  "a dead time (default: not known)")
+      ->check(non_negative());
+  command.add_option("--time-limit-s", options.time_limit_s, "Of the search (default: 300)")->check(positive());
+}
+
+control::IdentificationOptions usual_search() {
+  control::IdentificationOptions options;
+  options.tries_dead_time = true;
+  return options;
+}
+
+nlohmann::json given_of(const control::IdentificationOptions& search) {
+  const control::IdentificationOptions usual = usual_search();
+  nlohmann::json given = nlohmann::json::object();
+  if (search.structure) given["structure"] = analysis::text(*search.structure);
+  if (search.cost != usual.cost) given["cost"] = analysis::text(search.cost);
+  if (search.fits_offset != usual.fits_offset) given["fits_offset"] = search.fits_offset;
+  if (!search.tries_dead_time) given["dead_time_s"] = search.longest_dead_time_s;
+  if (search.sensor_lag_s) given["sensor_lag_s"] = *search.sensor_lag_s;
+  if (search.time_limit_s != usual.time_limit_s) given["time_limit_s"] = search.time_limit_s;
+  return given;
+}
 
 void add_options(CLI::App& command, Identify& options) {
   add_source(command, options);

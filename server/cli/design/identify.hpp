@@ -32,6 +32,8 @@ struct Plan {
   double acceleration_sd_m_s2 = 0;
 };
 
+control::IdentificationOptions usual_search();  // a dead time is looked for where the record asks for one
+
 struct Identify {
   std::optional<std::string> csv;
   std::vector<std::int64_t> runs;  // of several one model is found
@@ -42,7 +44,7 @@ struct Identify {
   bool with_velocity = false;
   bool cuts_at_gaps = false;
   analysis::ChannelChoice channels = analysis::ChannelChoice::best;
-  control::IdentificationOptions search;
+  control::IdentificationOptions search = usual_search();
   bool with_residuals = false;
   Plan plan;
   PlantChoice plant;  // of the plan
@@ -50,6 +52,9 @@ struct Identify {
 };
 
 void add_options(CLI::App& command, Identify& options);
+void add_search(CLI::App& command, control::IdentificationOptions& options);  // how a model is searched for
+// What is not as usual, by the names of a job's body.
+nlohmann::json given_of(const control::IdentificationOptions& search);
 
 // 0, or kNotConverged: then the best that was found stands in the answer.
 int run(const Identify& options, std::ostream& out);

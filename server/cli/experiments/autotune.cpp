@@ -27,6 +27,7 @@ constexpr double kSecondPrbsFrom_s = 129;
 
 AutotuneRequest request_of(const Autotune& options) {
   AutotuneRequest request = options.request;
+  request.search = given_of(options.search);
   request.profile = profile_document(options.profile);
   if (request.is_model_free && options.profile == kIdentificationSet) {
     request.profile = experiments::three_tones_document(request.crossover_rad_s, options.tone_amplitude_m);
@@ -120,6 +121,11 @@ void add_options(CLI::App& command, Autotune& options) {
   command.add_option("--mu", options.request.mu, "Order of the derivative, which gives up iso-damping")
       ->check(from_to(0.01, 1.99));
   add_experiments(command, options);
+  add_search(command, options.search);
+  for (const char* searching :
+       {"--structure", "--cost", "--offset", "--dead-time-s", "--sensor-lag-s", "--time-limit-s"}) {
+    command.get_option(searching)->excludes("--model-free");
+  }
   command.add_option("--resume", options.resume, "Keep what is done in this file, and go on from it if it exists")
       ->check(named());
   command.add_flag("--confirm", options.request.confirm,

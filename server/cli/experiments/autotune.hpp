@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 
+#include "server/cli/design/identify.hpp"
 #include "server/cli/experiments/autotune_chain.hpp"
 
 namespace CLI {
@@ -20,6 +21,7 @@ inline constexpr int kNothingMeetsIt = 3, kStageEnded = 5;
 struct Autotune {
   std::filesystem::path data_dir = "rheonaut-data";
   AutotuneRequest request;
+  control::IdentificationOptions search = usual_search();
   std::string profile = "identification_set", verify_profile = "figure_7";  // names, or files in TOML or JSON
   double tone_amplitude_m = 0.02;                                           // of a model-free identification
   std::optional<std::filesystem::path> resume;

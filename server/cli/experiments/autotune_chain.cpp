@@ -47,6 +47,7 @@ json fixed_request(const AutotuneRequest& request) {
              {"model_free", request.is_model_free},
              {"run_id", nullptr}};
   if (request.run) fixed["run_id"] = *request.run;
+  if (!request.search.empty()) fixed["search"] = request.search;
   return fixed;
 }
 
@@ -143,6 +144,7 @@ bool AutotuneChain::identify() {
 json AutotuneChain::identify_body() const {
   const std::int64_t run = *state_.number(kIdentification, "run_id");
   json body{{"kind", "identify"}, {"run_id", run}, {"cut_at_gaps", true}};
+  body.update(request_.search);
   if (request_.fit_to_s) body["to_s"] = *request_.fit_to_s;
   if (request_.validation_from_s) {
     body["validation_run_id"] = run;

@@ -29,6 +29,7 @@ struct AutotuneRequest {
   std::optional<std::int64_t> run;          // instead of the first experiment
   std::optional<double> fit_to_s;           // of the run; none: to its end
   std::optional<double> validation_from_s;  // the rest of the run, of which nothing is fitted; none: no validation
+  nlohmann::json search = nlohmann::json::object();  // of the model: fields of its job, those that were given
   double crossover_rad_s = 0, phase_margin_deg = 0;
   std::optional<double> mu;
   bool is_model_free = false;  // the profile, or the run, has three tones; no model is found

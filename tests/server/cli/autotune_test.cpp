@@ -320,13 +320,20 @@ TEST_F(AutotuneTest, AJobThatFailsAndAControllerThatIsNotReportedEndIt) {
 TEST_F(AutotuneTest, ARunTakesThePlaceOfTheExperiment) {
   options.request.run = 12;
   options.request.fit_to_s = 30;
+  options.search.sensor_lag_s = 0.01;
+  options.search.longest_dead_time_s = 0.1;
+  options.search.tries_dead_time = false;
   options.request.mu = 0.9;
   options.request.confirm = true;
   station.controller = nullptr;
   ASSERT_EQ(tune(), 0);
   EXPECT_EQ(station.count(kExperiments), 1);
-  EXPECT_EQ(station.body_of(kJobs),
-            (json{{"kind", "identify"}, {"run_id", 12}, {"cut_at_gaps", true}, {"to_s", 30.0}}));
+  EXPECT_EQ(station.body_of(kJobs), (json{{"kind", "identify"},
+                                          {"run_id", 12},
+                                          {"cut_at_gaps", true},
+                                          {"to_s", 30.0},
+                                          {"dead_time_s", 0.1},
+                                          {"sensor_lag_s", 0.01}}));
   EXPECT_FALSE(station.body_of(kJobs, 1).contains("duty_min")) << "the robot's range is not known";
   EXPECT_EQ(station.body_of(kJobs, 1)["mu"], 0.9);
   EXPECT_EQ(station.body_of(kPush)["confirm"], true);

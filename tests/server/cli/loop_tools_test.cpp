@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 
 #include <cmath>
+#include <numbers>
 
 #include "tests/server/cli/tool_test.hpp"
 
@@ -36,6 +37,11 @@ TEST_F(LoopTools, AMarginIsAsUncertainAsTheDoubtsOfItsModelMakeIt) {
   EXPECT_EQ(sure["plant_doubts_text"], "");
   EXPECT_THAT(wide["plant_doubts_text"].get<std::string>(), HasSubstr("each ± that follows is widened 3 times"));
   EXPECT_EQ(wide["plant_doubts"][0]["grave"], true);
+  const auto late = sigma(R"(, "doubts": [{"code": "dead_time_not_determined", "value": 0.005, "widening": 1}])");
+  const double of_dead_time_deg = 5 * 0.005 * 180 / std::numbers::pi;
+  EXPECT_NEAR(late["achieved"]["phase_margin_sigma_deg"], std::hypot(narrow_deg, of_dead_time_deg), 1e-9);
+  EXPECT_EQ(late["achieved"]["crossover_sigma_rad_s"], sure["achieved"]["crossover_sigma_rad_s"]);
+  EXPECT_THAT(late["plant_doubts_text"].get<std::string>(), HasSubstr("one sigma of it is 5 ms"));
   const auto unknown = sigma(R"(, "doubts": [{"code": "search_not_converged", "value": 2, "widening": null}])");
   EXPECT_EQ(unknown["achieved"]["phase_margin_sigma_deg"], nullptr);
   EXPECT_THAT(unknown["plant_doubts_text"].get<std::string>(), HasSubstr("no ± can be given"));
