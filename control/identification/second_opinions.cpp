@@ -320,8 +320,7 @@ std::vector<std::string> lag_doubts(const Recording& recording, const Identifica
 
 bool asks_for_dead_time(const Recording& recording, const IdentificationOptions& options, const Fit& fit) {
   if (!options.tries_dead_time || options.longest_dead_time_s > 0 || fit.starts == 0) return false;
-  if (fit.end == SearchEnd::cancelled) return false;
-  if (!fit.sensor) return recording.position_time_s.empty() && !fit.residuals_are_white;  // no clock that may be off
+  if (fit.end == SearchEnd::cancelled || !fit.sensor) return false;
   if (fit.sensor->delay_is_at_limit) return true;
   const double age_s = fit.sensor->has_own_clock ? recording.dt_s / 2 : recording.dt_s;  // at most
   const double late_s = fit.sensor->delay_s - age_s - options.sensor_lag_s.value_or(0);
@@ -339,8 +338,7 @@ bool is_explained_better(const Fit& with_dead_time, const Fit& without) {
   if (!(with_dead_time.model.dead_time_s > 0)) return false;
   // The delay of readings that were late has become the plant's: with as many parameters the residuals are as small.
   // How many readings are left out differs, so that no AIC tells.
-  if (without.sensor) return with_dead_time.residual_sd < kAsSmall * without.residual_sd;
-  return with_dead_time.aic < without.aic - kClearlyLowerAic;
+  return with_dead_time.residual_sd < kAsSmall * without.residual_sd;
 }
 
 std::vector<std::string> second_opinions(OutputErrorSearch& search, const Recording& recording,

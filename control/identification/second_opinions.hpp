@@ -26,8 +26,7 @@ std::vector<std::string> second_opinions(OutputErrorSearch& search, const Record
 std::vector<std::string> lag_doubts(const Recording& recording, const IdentificationOptions& options, const Fit& fit);
 
 // Whether a dead time that nobody named is to be searched for: the readings came later than the lag that (2) of
-// sensor_prior.hpp allows, or residuals of a position are not white; the options of that search, in the time that is
-// left; and whether what it found is to be taken.
+// sensor_prior.hpp allows; the options of that search, in the time that is left; and whether what it found is taken.
 bool asks_for_dead_time(const Recording& recording, const IdentificationOptions& options, const Fit& fit);
 IdentificationOptions with_dead_time(IdentificationOptions options, const Recording& shortest, double left_s);
 bool is_explained_better(const Fit& with_dead_time, const Fit& without);

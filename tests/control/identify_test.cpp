@@ -161,17 +161,6 @@ TEST(Identify, FindsTheDeadTimeBetweenSamples) {
   }
 }
 
-TEST(Identify, FindsADeadTimeThatNobodyNamedWhereItExplainsMore) {
-  for (const double dead_time_s : {0.0, 0.0333}) {
-    const std::vector<double> duty = prbs_duty(1, 0.2, 4, 0.01);
-    Recording recording{0.01, duty, output_of(kNonNewtonianModel, Channel::position, 0.01, duty, dead_time_s), {}};
-    add_noise(recording.position_m, 1e-4, 1);
-    IdentificationOptions options = first_start_only();
-    options.tries_dead_time = true;
-    EXPECT_NEAR(identify(recording, options).best.model.dead_time_s, dead_time_s, 1e-3);
-  }
-}
-
 TEST(Identify, ChoosesTheStructureOfTheModelByAic) {
   const std::vector<double> duty = prbs_duty(1, 0.2, 5, 0.01);
   IdentificationOptions options = unhurried_options();

@@ -150,8 +150,9 @@ class ExperimentsTest(unittest.TestCase):
                 os.waitpid(pid, 0)
                 os.close(terminal)
             run = station.get(f"/api/v1/runs/{station.get('/api/v1/runs?limit=1')['runs'][0]['run_id']}")
-            self.assertEqual(len(run["interrupted"]), 1, run["interrupted"])
-            self.assertNotEqual(run["interrupted"][0]["reason"], "requested")  # but why it was interrupted
+            reasons = [part["reason"] for part in run["interrupted"]]
+            self.assertGreater(len(reasons), 0)  # a busy machine may interrupt it again
+            self.assertNotIn("requested", reasons)  # but why it was interrupted
 
     def read_until(self, terminal, wanted):
         shown = b""
