@@ -52,7 +52,7 @@ std::vector<Doubt> doubts_about(const Fit& fit, const std::optional<ScoreEvidenc
 
 double dead_time_sd_s(std::span<const Doubt> doubts);  // 0: none is in doubt
 
-// Of an acceleration: a dead time and the age of the readings look the same. In doubt is the sensor's own lag, if it
+// A dead time and the age of an acceleration's readings look the same. In doubt is the sensor's own lag, if it
 // was not given, by (2) of sensor_prior.hpp or by the whole delay where that is shorter, and of samples in step with
 // the ticks when within a tick they were taken, dt/√12. It widens no response, and is the sd of a dead time: w = 1.
 std::optional<Doubt> dead_time_doubt(const Fit& fit, const IdentificationOptions& options, double dt_s);

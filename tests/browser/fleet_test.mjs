@@ -1,7 +1,7 @@
 // Many robots and several people: who may clear a latch, what is said of a stop of hundreds, robots that are hidden, and
 // robots whose samples nobody asked for.
 import assert from 'node:assert/strict';
-import { clear_latch, click_until, mode_of as mode, samples, shows, sign_in as sign_in_by, take_control } from './hands.mjs';
+import { clear_latch, mode_of as mode, samples, shows, sign_in as sign_in_by, take_control } from './hands.mjs';
 import { Bench, until } from './programs.mjs';
 
 const kRobot = 'rheo-1';
@@ -129,8 +129,10 @@ const steps = {
   },
 
   async 'and is stopped like any other'() {
-    await click_until(admin, '#stop-all', '#stop-line[data-phase=stopped]');
-    assert.match(await admin.locator('#stop-line').innerText(), new RegExp(`^Stopped ${kFleet + 1} of ${kFleet + 1} robots in \\d+ ms\\.$`));
+    await admin.click('#stop-all');
+    // SAFETY: one press is enough. Where its answer is too late for the page, telemetry says what became of it.
+    await shows(admin, '#stop-line', new RegExp(
+      `^Stopped( ${kFleet + 1} of ${kFleet + 1} robots in \\d+ ms|: telemetry of every robot shows the latch)\\.$`));
     for (const id of ['tank-1', 'tank-2', 'tank-12', kRobot]) {
       const { mode: found, emergency_id } = await until(`${id} is latched`, async () => ((await robot(id)).mode === 'emergency' ? robot(id) : null));
       assert.equal(found, 'emergency');
@@ -147,7 +149,8 @@ const steps = {
     await large.goto(bench.http);
     await until('all are known', async () => (await large.locator('.robot-entry').count()) === kKnown + kFleet + 1);
     await entry(large, kRobot).click();
-    await click_until(large, '#stop-all', '#stop-line[data-phase=kept]');
+    await large.click('#stop-all');
+    await large.locator('#stop-line[data-phase=kept]').waitFor();
     const words = await large.locator('#stop-line').innerText();
     assert.match(words, /Stopped 13 of 633 robots in \d+ ms\./);
     assert.match(words, /and 617 more: not connected; kept/);

@@ -53,7 +53,7 @@ struct Identify {
 
 void add_options(CLI::App& command, Identify& options);
 void add_search(CLI::App& command, control::IdentificationOptions& options);  // how a model is searched for
-// What is not as usual, by the names of a job's body.
+// The fields of a job's body for what is not as usual.
 nlohmann::json given_of(const control::IdentificationOptions& search);
 
 // 0, or kNotConverged: then the best that was found stands in the answer.
