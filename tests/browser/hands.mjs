@@ -63,13 +63,6 @@ export const take_control = (page, is_taken) =>
     return until('it is', is_taken, 2000).catch(() => false);
   });
 
-// Clicks what may be clicked again, until what it leads to is there: an answer may be too late for a page on a busy machine.
-export const click_until = (page, selector, done) =>
-  until(`${done} is there`, async () => {
-    await page.click(selector);
-    return page.locator(done).first().waitFor({ timeout: 20_000 }).then(() => true, () => false);
-  });
-
 // Sends a setpoint until the page says that it is in force: a command that is too old when it arrives is refused.
 export const send_setpoint = (page, setpoint_mm) =>
   until(`the setpoint ${setpoint_mm} mm is in force`, async () => {

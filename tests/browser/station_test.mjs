@@ -3,7 +3,7 @@ import assert from 'node:assert/strict';
 import { existsSync } from 'node:fs';
 import { createRequire } from 'node:module';
 import { assert_accessible } from './accessible.mjs';
-import { click_until, commanded, hold as hold_on, shows, sign_in } from './hands.mjs';
+import { commanded, hold as hold_on, shows, sign_in } from './hands.mjs';
 import { Bench, until } from './programs.mjs';
 
 const { encode } = createRequire(new URL('../../web/package.json', import.meta.url))('uqr');
@@ -92,7 +92,8 @@ const steps = {
     assert.deepEqual(users.map(({ name, role }) => [name, role]), [['vera', 'viewer']]);
     await row.locator('button').click();
     await page.fill('#station-edit-password', 'another horse battery');
-    await click_until(page, '#station-save-user', '#station-user-changed');
+    await page.click('#station-save-user');
+    await page.locator('#station-user-changed').waitFor();
     assert.equal(await text('#station-changed-password'), 'another horse battery');
     await page.locator('#station-user-changed button', { hasText: 'Done' }).click();
     await page.locator('#station-user-changed').waitFor({ state: 'detached' });

@@ -31,6 +31,8 @@ async function report(name, bench, error) {
   mkdirSync(out, { recursive: true });
   for (const [number, page] of (bench?.pages ?? []).entries()) {
     await page.screenshot({ path: `${out}failed_${name}_${number}.png`, timeout: 20_000 }).catch(() => undefined);
+    const said = await page.locator('[role=alert]').allInnerTexts().catch(() => []);
+    console.error(`${name}, page ${number} at ${page.url()} says: ${said.filter((text) => text !== '').join(' | ') || 'nothing'}`);
   }
   console.error(`${name}, station:\n${bench?.station?.output}\nrobot:\n${bench?.robot?.output}\nfleet:\n${bench?.fleet?.output}`);
 }

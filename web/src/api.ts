@@ -79,7 +79,9 @@ const kOverviewChannels = [
   'estimated_position_m',
 ].join(',');
 const kPatience_ms = 6000;
-const kLongPatience_ms = 30_000; // for what is computed from many samples
+// For what is computed from many samples, and for changes that move nothing: the station makes a hash of a password, or
+// writes a back-up, and a page that gives up early says of what was done that it was not answered.
+const kLongPatience_ms = 30_000;
 
 export class Api {
   // `stamp_us`: the latest of the live link, null while it is down; a command is worth as little as what its operator saw
@@ -175,7 +177,7 @@ export class Api {
   robot_parameters = (robot_id: string) => this.ask<ParametersInForce>('GET', past(robot_id, 'parameters', {}));
   robot_controller = (robot_id: string) => this.ask<ControllerInForce>('GET', past(robot_id, 'controller', {}));
 
-  log_in = (user: string, password: string) => this.ask<Me>('POST', '/login', { user, password });
+  log_in = (user: string, password: string) => this.change<Me>('/login', { user, password });
   redeem_link = (code: string) => this.ask<Me>('POST', '/login', { code });
   log_out = () => this.ask<object>('POST', '/logout');
   me = () => this.ask<Me>('GET', '/me');
@@ -195,7 +197,8 @@ export class Api {
   // For a view that has functions of its own for its routes. A request whose signal is aborted is cancelled by the station.
   read = <Answer>(path: string, signal?: AbortSignal, patience_ms = kLongPatience_ms) =>
     this.ask<Answer>('GET', path, undefined, undefined, { signal, patience_ms });
-  change = <Answer>(path: string, body: object) => this.ask<Answer>('POST', path, body);
+  change = <Answer>(path: string, body: object) =>
+    this.ask<Answer>('POST', path, body, undefined, { patience_ms: kLongPatience_ms });
 
   // True when the station answers that this page may not speak to it.
   async is_signed_out(): Promise<boolean> {

@@ -1,5 +1,5 @@
 // Requests to the station, and its refusals as sentences.
-import { expect, test } from 'vitest';
+import { expect, test, vi } from 'vitest';
 import { Api, ApiError } from '../src/api';
 
 function api_that_answers(status: number, body: unknown) {
@@ -48,6 +48,17 @@ test('only a sign-in that has to wait says that there were too many attempts', a
   expect((await failure(throttled.log_in('a', 'b'))).message).toMatch(/^Too many attempts/);
   const busy = api_that_answers(429, { detail: 'your address has as many connections', reason: 'too_many_pages' }).api;
   expect((await failure(busy.set_manual('rheo-1'))).message).toBe('your address has as many connections');
+});
+
+test('what moves a robot is waited for 6 s, and a change that moves nothing for 30 s', async () => {
+  const patience = vi.spyOn(AbortSignal, 'timeout');
+  const { api } = api_that_answers(200, {});
+  await api.set_manual('rheo-1');
+  await api.emergency_stop('rheo-1', 'a key').catch(() => undefined);
+  await api.log_in('a', 'b');
+  await api.change('/users', { name: 'a' });
+  expect(patience.mock.calls).toEqual([[6000], [6000], [30_000], [30_000]]);
+  patience.mockRestore();
 });
 
 test('an answer that is no JSON is an error with its status', async () => {
