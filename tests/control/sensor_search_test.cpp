@@ -119,6 +119,19 @@ TEST(SensorSearch, ADeadTimeThatNobodyNamedIsFoundWhereTheReadingsComeLater) {
   EXPECT_NEAR(identified_by_itself(0.12, std::nullopt).best.model.dead_time_s, 0.12, 0.003) << "beyond any lag";
 }
 
+TEST(SensorSearch, ADeadTimeThatNobodyNamedIsFoundInSeveralRunsTogether) {
+  IdentificationOptions options = one_start();
+  const std::vector<Recording> runs{acceleration_run(6, 0.002, 0, 0, 0.04), acceleration_run(4, 0.002, 0, 0, 0.04)};
+  EXPECT_EQ(identify_together(runs, options).best.model.dead_time_s, 0) << "not looked for";
+  options.tries_dead_time = true;
+  const Identification found = identify_together(runs, options);
+  EXPECT_NEAR(found.best.model.dead_time_s, 0.04, 0.003);
+  const double of_age_s = 0.01 / std::sqrt(12.0);
+  EXPECT_NEAR(dead_time_sd_s(found.doubts), std::hypot(0.005, of_age_s), 1e-9);
+  const std::vector<Recording> prompt{acceleration_run(6, 0.002, 0), acceleration_run(4, 0.002, 0)};
+  EXPECT_EQ(identify_together(prompt, options).best.model.dead_time_s, 0);
+}
+
 TEST(SensorSearch, WhatTheAgeOfTheReadingsHidesIsTheDoubtOfTheDeadTime) {
   const double of_age_s = 0.01 / std::sqrt(12.0);  // its samples keep step with the ticks
   EXPECT_NEAR(dead_time_sd_s(identified_by_itself(0.03, std::nullopt).doubts), std::hypot(0.005, of_age_s), 1e-9);

@@ -102,6 +102,33 @@ TEST_F(PreviewBand, AtTheEdgeOfWhatAModelMayBeTheOtherSideCounts) {
   EXPECT_TRUE(std::ranges::all_of(sd, [](double each) { return std::isfinite(each); }));
 }
 
+// To first order the position of a later plant is the one of that time before.
+TEST_F(PreviewBand, OfADeadTimeItIsTheWayOfThatTime) {
+  use("figure_5");
+  constexpr std::size_t kTicks = 3;
+  known.dead_time_sd_s = kTicks * kTick_s;
+  const auto position = position_m(kNonNewtonianModel, proportional(1));
+  const auto sd = position_sd_m(proportional(1));
+  for (const std::size_t k : {130U, 150U, 200U}) {
+    ASSERT_GT(position[k] - position[k - kTicks], 2e-4) << k;
+    EXPECT_NEAR(sd[k], position[k] - position[k - kTicks], 1e-9) << k;
+  }
+}
+
+TEST_F(PreviewBand, OfADeadTimeAndParametersTheSquaresAddUp) {
+  use("figure_7");
+  known.one_sigma[0] = 0.02 * kNonNewtonianModel.kp;
+  const auto of_gain = position_sd_m(proportional(10));
+  known.dead_time_sd_s = 0.01;
+  const auto of_both = position_sd_m(proportional(10));
+  known.one_sigma[0] = 0;
+  const auto of_dead_time = position_sd_m(proportional(10));
+  ASSERT_GT(of_dead_time[50], 1e-4);
+  for (const std::size_t k : {50U, 100U, 200U}) {
+    EXPECT_NEAR(of_both[k], std::hypot(of_gain[k], of_dead_time[k]), 1e-12) << k;
+  }
+}
+
 TEST_F(PreviewBand, OfAKnownModelIsZero) {
   use("figure_5");
   EXPECT_EQ(std::ranges::max(position_sd_m(proportional(1))), 0);
