@@ -2,11 +2,13 @@
 #include "control/identification/doubts.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <sstream>
+#include <utility>
 
-#include "control/identification/amplitude_doubt.hpp"
 #include "control/identification/identifiability.hpp"
+#include "control/identification/score_doubts.hpp"
 #include "control/sensor/sensor_prior.hpp"
 
 namespace control {
@@ -14,20 +16,36 @@ namespace {
 
 constexpr double kWholeRun = 0.999;
 constexpr double kSmallestDeadTimeSdS = 0.0005;
+constexpr double kFarSds = 3;  // of a prior
 
 void add_search(const Fit& fit, std::vector<Doubt>& doubts) {
   if (fit.end == SearchEnd::converged) return;
   doubts.push_back({DoubtCode::search_not_converged, fit.iterations, {}, std::nullopt});
 }
 
-void add_residuals(const Fit& fit, const std::optional<ScoreEvidence>& amplitude, std::vector<Doubt>& doubts) {
+void add_residuals(const Fit& fit, const std::optional<ScoreEvidence>& amplitude,
+                   const std::optional<ScoreEvidence>& input, std::vector<Doubt>& doubts) {
   if (changes_with_amplitude(amplitude)) {
     doubts.push_back({DoubtCode::no_linear_model_over_amplitude, amplitude->share, {}, amplitude->widening});
+  } else if (follows_input(input)) {
+    doubts.push_back({DoubtCode::correlated_with_input, input->share, {}, input->widening});
   }
   if (!fit.residuals_are_white) {
     doubts.push_back({DoubtCode::residuals_not_white, fit.colour_factor, {}, fit.colour_factor});
   }
   if (fit.drift_factor > 1) doubts.push_back({DoubtCode::residuals_drift, fit.drift_factor, {}, fit.drift_factor});
+}
+
+void add_sensor(const Fit& fit, std::vector<Doubt>& doubts) {
+  if (!fit.sensor) return;
+  const double low_pass_sds = std::log(fit.sensor->time_constant_s / kDataSheetTimeConstantS) / kLowPassSd;
+  const std::array<std::pair<const char*, double>, 2> off{
+      {{"time_constant_s", low_pass_sds}, {"period_s", fit.sensor->clock_off / kClockSd}}};
+  for (const auto& [name, sds] : off) {
+    if (!(std::abs(sds) > kFarSds)) continue;
+    const double widening = std::sqrt(1 + (sds * sds - 1) / std::max(1, fit.free_parameters));
+    doubts.push_back({DoubtCode::sensor_unlike_data_sheet, std::abs(sds), name, widening});
+  }
 }
 
 std::string rounded(double value, int digits) {
@@ -49,6 +67,11 @@ std::string in_words(const Doubt& doubt) {
     case DoubtCode::no_linear_model_over_amplitude:
       return "no linear model holds over the amplitudes of the run: ones that follow duty and speed explain " +
              rounded(100 * value, 2) + " % of what the model leaves";
+    case DoubtCode::correlated_with_input:
+      return "the residuals follow the duty: another linear model would explain " + rounded(100 * value, 2) +
+             " % of what this one leaves";
+    case DoubtCode::sensor_unlike_data_sheet:
+      return "the sensor's " + doubt.parameter + " is " + rounded(value, 2) + " sds off its data sheet";
     case DoubtCode::runs_disagree:
       return "the runs do not agree on one model: parameters of their own explain " + rounded(100 * value, 2) +
              " % of what the common ones leave";
@@ -83,10 +106,12 @@ double dead_time_sd_s(std::span<const Doubt> doubts) {
   return found == doubts.end() ? 0 : found->value.value_or(0);
 }
 
-std::vector<Doubt> doubts_about(const Fit& fit, const std::optional<ScoreEvidence>& amplitude, double share_used) {
+std::vector<Doubt> doubts_about(const Fit& fit, const std::optional<ScoreEvidence>& amplitude,
+                                const std::optional<ScoreEvidence>& input, double share_used) {
   std::vector<Doubt> doubts;
   add_search(fit, doubts);
-  add_residuals(fit, amplitude, doubts);
+  add_residuals(fit, amplitude, input, doubts);
+  add_sensor(fit, doubts);
   for (const std::size_t i : undetermined_parameters(fit)) {
     std::optional<double> sigma = fit.one_sigma[i];
     if (sigma && !is_order(i)) *sigma /= parameters_of(fit.model)[i];
@@ -103,7 +128,8 @@ std::optional<Doubt> dead_time_doubt(const Fit& fit, const IdentificationOptions
   if (!fit.sensor || fit.starts == 0) return std::nullopt;
   if (fit.sensor->delay_is_at_limit) return Doubt{DoubtCode::dead_time_not_determined, std::nullopt, {}, std::nullopt};
   const double late_s = std::max(0.0, fit.sensor->delay_s - dt_s / 2);
-  const double of_lag_s = options.sensor_lag_s ? 0 : std::min(kLagSdS, late_s);
+  const bool is_no_lag = fit.model.dead_time_s == 0 && late_s > kFarSds * kLagSdS;
+  const double of_lag_s = options.sensor_lag_s ? 0 : is_no_lag ? late_s : std::min(kLagSdS, late_s);
   const double of_age_s = fit.sensor->has_own_clock ? 0 : dt_s / std::sqrt(12.0);
   const double sd_s = std::hypot(of_lag_s, of_age_s);
   if (sd_s < kSmallestDeadTimeSdS) return std::nullopt;

@@ -5,11 +5,11 @@
 #include <iterator>
 #include <map>
 
-#include "control/identification/amplitude_doubt.hpp"
 #include "control/identification/fit_summary.hpp"
 #include "control/identification/identifiability.hpp"
 #include "control/identification/recording_checks.hpp"
 #include "control/identification/residual_doubts.hpp"
+#include "control/identification/score_doubts.hpp"
 #include "control/identification/second_opinions.hpp"
 #include "control/identification/structure_choice.hpp"
 #include "control/identification/unit_doubts.hpp"
@@ -45,6 +45,7 @@ Identification identified(const Recording& recording, const IdentificationOption
   put_best_first(result.compared);
   result.best = result.compared.front();
   result.amplitude = amplitude_evidence(search, recording, result.best, points[result.best.structure]);
+  result.input = input_evidence(search, recording, result.best, points[result.best.structure]);
   std::vector<std::string>& warnings = result.warnings;
   const auto add = [&](std::vector<std::string> more) { std::ranges::move(more, std::back_inserter(warnings)); };
   add(unit_doubts(recording));
@@ -54,12 +55,13 @@ Identification identified(const Recording& recording, const IdentificationOption
   add(second_opinions(search, recording, options, result.best));
   const bool order_is_forced = options.structure && *options.structure != Structure::fractional;
   add(amplitude_doubts(result.amplitude, recording, order_is_forced, options.names.structure));
+  add(input_doubts(result.input, result.amplitude, options));
   add(residual_doubts(search, recording, options, result.best));
   add(identifiability_warnings(recording, result.best, options));
   add_verdict(result.compared, 1, warnings);
   add_rival(result.compared, warnings);
   if (search.limit().has_passed()) return out_of_time();  // a doubt may be missing
-  result.doubts = doubts_about(result.best, result.amplitude, share_used({&recording, 1}));
+  result.doubts = doubts_about(result.best, result.amplitude, result.input, share_used({&recording, 1}));
   if (auto doubt = dead_time_doubt(result.best, options, recording.dt_s)) result.doubts.push_back(std::move(*doubt));
   return result;
 }
@@ -77,10 +79,10 @@ Identification identify(const Recording& recording, const IdentificationOptions&
   check_options(options, recording);
   const double deadline_s = steady_now_s() + options.time_limit_s;
   Identification found = identified(recording, options);
-  if (!asks_for_dead_time(recording, options, found.best)) return found;
+  if (!asks_for_dead_time(recording, options, found.best, found.input)) return found;
   Identification late = identified(recording, with_dead_time(options, recording, deadline_s - steady_now_s()));
   if (late.best.end == SearchEnd::time_limit) return late;
-  return is_explained_better(late.best, found.best) ? late : found;
+  return is_explained_better(late, found) ? late : found;
 }
 
 Fit evaluate(const FractionalModel& model, const Recording& recording, const IdentificationOptions& options) {

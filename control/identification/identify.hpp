@@ -55,11 +55,11 @@ struct JointRun {
 
 struct Identification {
   Fit best;
-  std::vector<Fit> compared;               // one per structure: the best, then by AIC; unfinished and untried ones last
-  std::optional<ScoreEvidence> amplitude;  // of the best; none: nothing to compare
-  std::vector<std::string> warnings;       // in words, with numbers and what to do
-  std::vector<Doubt> doubts;               // those of them that its uses count
-  std::vector<JointRun> runs;              // of several recordings, in their order; empty: there was one
+  std::vector<Fit> compared;  // one per structure: the best, then by AIC; unfinished and untried ones last
+  std::optional<ScoreEvidence> amplitude, input;  // of the best; none: nothing to compare
+  std::vector<std::string> warnings;              // in words, with numbers and what to do
+  std::vector<Doubt> doubts;                      // those of them that its uses count
+  std::vector<JointRun> runs;                     // of several recordings, in their order; empty: there was one
 };
 
 // The result of a search that has reached its time limit: no model.

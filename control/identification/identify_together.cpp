@@ -5,12 +5,12 @@
 #include <utility>
 
 #include "base/invalid_argument.hpp"
-#include "control/identification/amplitude_doubt.hpp"
 #include "control/identification/identifiability.hpp"
 #include "control/identification/identify.hpp"
 #include "control/identification/joint_fit.hpp"
 #include "control/identification/recording_checks.hpp"
 #include "control/identification/residual_doubts.hpp"
+#include "control/identification/score_doubts.hpp"
 #include "control/identification/second_opinions.hpp"
 #include "control/identification/structure_choice.hpp"
 #include "control/identification/unit_doubts.hpp"
@@ -44,16 +44,26 @@ void check_together(std::span<const Recording> recordings, const IdentificationO
   }
 }
 
+// Of one run.
+struct JointEvidence {
+  std::optional<ScoreEvidence> amplitude, input;
+};
+
+void keep_clearer(const std::optional<ScoreEvidence>& evidence, std::optional<ScoreEvidence>& kept) {
+  if (evidence && (!kept || evidence->f > kept->f)) kept = evidence;
+}
+
 // What concerns one run only.
 std::vector<std::string> doubts_of(JointSearch& search, std::size_t i, const Recording& recording,
                                    const IdentificationOptions& options, const Fit& fit,
-                                   const std::optional<ScoreEvidence>& amplitude) {
+                                   const JointEvidence& evidence) {
   std::vector<std::string> warnings;
   append(warnings, unit_doubts(recording));
   append(warnings, lag_doubts(recording, options, fit));
   append(warnings, second_opinions(search.of_run(i), recording, options, fit));
   const bool order_is_forced = options.structure && *options.structure != Structure::fractional;
-  append(warnings, amplitude_doubts(amplitude, recording, order_is_forced, options.names.structure));
+  append(warnings, amplitude_doubts(evidence.amplitude, recording, order_is_forced, options.names.structure));
+  append(warnings, input_doubts(evidence.input, evidence.amplitude, options));
   append(warnings, residual_doubts(search.of_run(i), recording, options, fit));
   return warnings;
 }
@@ -62,9 +72,11 @@ void add_runs(JointSearch& search, std::span<const Recording> recordings, const 
               const JointResult& found, JointFit fit, Identification& result) {
   for (std::size_t i = 0; i < recordings.size(); ++i) {
     JointRun run{std::move(fit.runs[i]), {}};
-    const auto amplitude = amplitude_evidence(search.of_run(i), recordings[i], run.fit, found.points[i]);
-    if (amplitude && (!result.amplitude || amplitude->f > result.amplitude->f)) result.amplitude = amplitude;
-    run.warnings = doubts_of(search, i, recordings[i], options, run.fit, amplitude);
+    const JointEvidence evidence{amplitude_evidence(search.of_run(i), recordings[i], run.fit, found.points[i]),
+                                 input_evidence(search.of_run(i), recordings[i], run.fit, found.points[i])};
+    keep_clearer(evidence.amplitude, result.amplitude);
+    keep_clearer(evidence.input, result.input);
+    run.warnings = doubts_of(search, i, recordings[i], options, run.fit, evidence);
     result.runs.push_back(std::move(run));
   }
 }
@@ -99,7 +111,7 @@ Identification identified(std::span<const Recording> recordings, const Identific
   add_verdict(result.compared, recordings.size(), warnings);
   add_rival(result.compared, warnings);
   if (search.is_out_of_time()) return out_of_time();  // a doubt may be missing
-  result.doubts = doubts_about(result.best, result.amplitude, share_used(recordings));
+  result.doubts = doubts_about(result.best, result.amplitude, result.input, share_used(recordings));
   if (disagreeing) {
     result.doubts.push_back({DoubtCode::runs_disagree, disagreeing->share, {}, disagreeing->widening});
   }
@@ -118,14 +130,14 @@ Identification identify_together(std::span<const Recording> recordings, const Id
   Identification found = identified(recordings, options);
   bool asks = false;
   for (std::size_t i = 0; i < found.runs.size(); ++i) {
-    asks = asks || asks_for_dead_time(recordings[i], options, found.runs[i].fit);
+    asks = asks || asks_for_dead_time(recordings[i], options, found.runs[i].fit, found.input);
   }
   if (!asks) return found;
   const Recording& shortest = *std::ranges::min_element(
       recordings, {}, [](const Recording& one) { return one.dt_s * static_cast<double>(one.duty.size()); });
   Identification late = identified(recordings, with_dead_time(options, shortest, deadline_s - steady_now_s()));
   if (late.best.end == SearchEnd::time_limit) return late;
-  return is_explained_better(late.best, found.best) ? late : found;
+  return is_explained_better(late, found) ? late : found;
 }
 
 }  // namespace control

@@ -11,6 +11,7 @@
 #include "base/invalid_argument.hpp"
 #include "control/identification/fit_summary.hpp"
 #include "control/identification/residual_doubts.hpp"
+#include "control/identification/score_doubts.hpp"
 #include "control/search/fit_statistics.hpp"
 #include "control/search/missed_ticks.hpp"
 #include "control/sensor/sensor_prior.hpp"
@@ -318,9 +319,11 @@ std::vector<std::string> lag_doubts(const Recording& recording, const Identifica
   return {text.str()};
 }
 
-bool asks_for_dead_time(const Recording& recording, const IdentificationOptions& options, const Fit& fit) {
+bool asks_for_dead_time(const Recording& recording, const IdentificationOptions& options, const Fit& fit,
+                        const std::optional<ScoreEvidence>& input) {
   if (!options.tries_dead_time || options.longest_dead_time_s > 0 || fit.starts == 0) return false;
-  if (fit.end == SearchEnd::cancelled || !fit.sensor) return false;
+  if (fit.end == SearchEnd::cancelled) return false;
+  if (!fit.sensor) return follows_input(input);
   if (fit.sensor->delay_is_at_limit) return true;
   const double age_s = fit.sensor->has_own_clock ? recording.dt_s / 2 : recording.dt_s;  // at most
   const double late_s = fit.sensor->delay_s - age_s - options.sensor_lag_s.value_or(0);
@@ -334,11 +337,16 @@ IdentificationOptions with_dead_time(IdentificationOptions options, const Record
   return options;
 }
 
-bool is_explained_better(const Fit& with_dead_time, const Fit& without) {
-  if (!(with_dead_time.model.dead_time_s > 0)) return false;
+bool is_explained_better(const Identification& with_dead_time, const Identification& without) {
+  const Fit &late = with_dead_time.best, &prompt = without.best;
+  if (!(late.model.dead_time_s > 0)) return false;
+  const bool has_sensor = prompt.sensor || std::ranges::any_of(without.runs, [](const JointRun& run) {
+                            return run.fit.sensor.has_value();
+                          });
+  if (!has_sensor) return late.aic < prompt.aic - kClearlyLowerAic;
   // The delay of readings that were late has become the plant's: with as many parameters the residuals are as small.
   // How many readings are left out differs, so that no AIC tells.
-  return with_dead_time.residual_sd < kAsSmall * without.residual_sd;
+  return late.residual_sd < kAsSmall * prompt.residual_sd;
 }
 
 std::vector<std::string> second_opinions(OutputErrorSearch& search, const Recording& recording,

@@ -10,9 +10,11 @@
 // Errors: none thrown.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "control/identification/identify.hpp"
 #include "control/search/fit.hpp"
 #include "control/search/output_error_search.hpp"
 
@@ -25,10 +27,12 @@ std::vector<std::string> second_opinions(OutputErrorSearch& search, const Record
 // which of the two it was attributed.
 std::vector<std::string> lag_doubts(const Recording& recording, const IdentificationOptions& options, const Fit& fit);
 
-// Whether a dead time that nobody named is to be searched for: the readings came later than the lag that (2) of
-// sensor_prior.hpp allows; the options of that search, in the time that is left; and whether what it found is taken.
-bool asks_for_dead_time(const Recording& recording, const IdentificationOptions& options, const Fit& fit);
+// Whether a dead time that nobody named is to be searched for: readings of an acceleration come later than the lag that
+// (2) of sensor_prior.hpp allows, or residuals of another record follow the duty (score_doubts.hpp); the options of
+// that search, in the time that is left; and whether what it found is taken.
+bool asks_for_dead_time(const Recording& recording, const IdentificationOptions& options, const Fit& fit,
+                        const std::optional<ScoreEvidence>& input);
 IdentificationOptions with_dead_time(IdentificationOptions options, const Recording& shortest, double left_s);
-bool is_explained_better(const Fit& with_dead_time, const Fit& without);
+bool is_explained_better(const Identification& with_dead_time, const Identification& without);
 
 }  // namespace control

@@ -84,6 +84,7 @@ struct SensorFit {
   bool readings_are_recovered = false;  // the robot's own bias is off the record, and with it its model
   bool has_own_clock = false;           // else its samples keep step with the ticks
   double period_s = 0;                  // of its samples, by the robot's clock
+  double clock_off = 0;                 // by how much that is longer than the robot's period, relative
   double time_constant_s = 0;           // of its low pass
   double delay_s = 0;                   // of a reading, in the mean, the low pass aside
   bool delay_is_at_limit = false;       // of what was searched
@@ -128,7 +129,7 @@ struct Fit {
 };
 
 // A score test's answer to what further parameters would explain: ones that change with amplitude
-// (amplitude_doubt.hpp), or of each run its own (joint_fit.hpp).
+// or another linear model (score_doubts.hpp), or parameters of each run's own (joint_fit.hpp).
 struct ScoreEvidence {
   double share = 0;     // of the squares of the residuals, that they explain
   double f = 0;         // about 1 where nothing changes

@@ -162,6 +162,7 @@ std::optional<SensorFit> OutputErrorSearch::sensor_fit(const SearchPoint& point)
   fit.readings_are_recovered = path->readings_are_recovered();
   fit.has_own_clock = path->has_own_clock();
   fit.period_s = point.sensor.period_s;
+  fit.clock_off = fit.has_own_clock ? fit.period_s / dt_s_ - 1 : 0;
   fit.time_constant_s = point.sensor.time_constant_s;
   fit.delay_s = sensor_lag_s(point) + dt_s_ / 2;
   fit.delay_is_at_limit = point.sensor.first_s < earliest_sample_s() + kNearLimit * dt_s_;

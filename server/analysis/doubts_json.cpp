@@ -17,11 +17,17 @@ namespace {
 
 constexpr std::size_t kMostDoubts = 32;
 constexpr double kNoticeable = 1.05;  // widening
-constexpr std::array kCodes{DoubtCode::search_not_converged,    DoubtCode::no_linear_model_over_amplitude,
-                            DoubtCode::runs_disagree,           DoubtCode::residuals_not_white,
-                            DoubtCode::residuals_drift,         DoubtCode::parameter_not_determined,
-                            DoubtCode::parameter_at_bound,      DoubtCode::part_of_run_used,
-                            DoubtCode::dead_time_not_determined};
+constexpr std::array kCodes{DoubtCode::search_not_converged,
+                            DoubtCode::no_linear_model_over_amplitude,
+                            DoubtCode::runs_disagree,
+                            DoubtCode::residuals_not_white,
+                            DoubtCode::residuals_drift,
+                            DoubtCode::parameter_not_determined,
+                            DoubtCode::parameter_at_bound,
+                            DoubtCode::part_of_run_used,
+                            DoubtCode::dead_time_not_determined,
+                            DoubtCode::correlated_with_input,
+                            DoubtCode::sensor_unlike_data_sheet};
 
 std::optional<double> number_or_none(const json& value) {
   return value.is_null() ? std::nullopt : std::optional{value.get<double>()};
@@ -56,6 +62,8 @@ const char* text(DoubtCode value) {
     case DoubtCode::parameter_at_bound: return "parameter_at_bound";
     case DoubtCode::part_of_run_used: return "part_of_run_used";
     case DoubtCode::dead_time_not_determined: return "dead_time_not_determined";
+    case DoubtCode::correlated_with_input: return "correlated_with_input";
+    case DoubtCode::sensor_unlike_data_sheet: return "sensor_unlike_data_sheet";
   }
   return "unknown";
 }

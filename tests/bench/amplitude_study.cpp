@@ -1,4 +1,5 @@
-// Prints how often identification says that the parameters change with amplitude: amplitude_study [SEEDS [FIRST]].
+// Prints how often identification says that the parameters change with amplitude, or that the residuals follow the
+// duty: amplitude_study [SEEDS [FIRST]].
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
@@ -33,7 +34,8 @@ std::vector<double> duty_of(Drive drive, std::uint64_t seed) {
 }
 
 struct Row {
-  int doubts = 0, compared = 0;
+  int doubts = 0, compared = 0, follow = 0;
+  double most_input_share = 0, most_input_f = 0;
   double least_share = 1, most_share = 0, least_f = 1e300, most_f = 0;
 };
 
@@ -42,9 +44,15 @@ void add(const control::Recording& recording, Row& row) {
   options.structure = control::Structure::fractional;
   options.further_starts = 0;
   const auto found = control::identify(recording, options);
-  row.doubts += static_cast<int>(std::ranges::count_if(found.warnings, [](const std::string& text) {
-    return text.starts_with("the parameters change with amplitude");
-  }));
+  const auto says = [&found](const char* begin) {
+    return std::ranges::any_of(found.warnings, [begin](const std::string& text) { return text.starts_with(begin); });
+  };
+  row.doubts += says("the parameters change with amplitude") ? 1 : 0;
+  row.follow += says("the residuals follow the duty") ? 1 : 0;
+  if (found.input) {
+    row.most_input_share = std::max(row.most_input_share, found.input->share);
+    row.most_input_f = std::max(row.most_input_f, found.input->f);
+  }
   if (!found.amplitude) return;
   ++row.compared;
   row.least_share = std::min(row.least_share, found.amplitude->share);
@@ -54,9 +62,10 @@ void add(const control::Recording& recording, Row& row) {
 }
 
 void print(const Fluid& fluid, const char* fitted, Drive drive, const Row& row, int seeds) {
-  std::printf("| %s | %s | %s | %d of %d | %.1f to %.1f %% | %.1f to %.1f |\n", fluid.name.c_str(), fitted,
-              kDriveNames[static_cast<int>(drive)], row.doubts, seeds, 100 * row.least_share, 100 * row.most_share,
-              row.least_f, row.most_f);
+  std::printf("| %s | %s | %s | %d of %d | %.1f to %.1f %% | %.1f to %.1f | %d | up to %.1f %% | up to %.1f |\n",
+              fluid.name.c_str(), fitted, kDriveNames[static_cast<int>(drive)], row.doubts, seeds,
+              100 * row.least_share, 100 * row.most_share, row.least_f, row.most_f, row.follow,
+              100 * row.most_input_share, row.most_input_f);
   if (row.compared < seeds) std::printf("(%d of them compared)\n", row.compared);
   std::fflush(stdout);
 }
@@ -66,8 +75,10 @@ void print(const Fluid& fluid, const char* fitted, Drive drive, const Row& row, 
 int main(int argc, char** argv) {
   const int seeds = argc > 1 ? std::atoi(argv[1]) : 20, first = argc > 2 ? std::atoi(argv[2]) : 1;
   if (seeds < 1 || first < 1) return std::fprintf(stderr, "amplitude_study: SEEDS and FIRST are positive numbers\n"), 2;
-  std::printf("| fluid (%d seeds from %d) | fitted | duty | doubted | share | F |\n|---|---|---|---|---|---|\n", seeds,
-              first);
+  std::printf(
+      "| fluid (%d seeds from %d) | fitted | duty | amplitude doubted | share | F | follows the duty | share | F |\n",
+      seeds, first);
+  std::printf("|---|---|---|---|---|---|---|---|---|\n");
   for (const Fluid& fluid : fluids()) {
     for (const Drive drive : {Drive::steps, Drive::levels, Drive::binary}) {
       Row acceleration, position;

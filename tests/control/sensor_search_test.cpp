@@ -26,12 +26,12 @@ constexpr FractionalModel kFluid{0.1, 0.006, 0.11, 1, 2, 1};
 // Each tick reads a sample 0.75 ticks old, after a low pass and `late_s`, a lag of the sensor or a dead time. Of the
 // reads at which the acceleration moves by more than `moves_by_m_s2` a share fails, and repeats the last one.
 Recording acceleration_run(double duration_s, double noise_m_s2, double failed_share, double moves_by_m_s2 = 0,
-                           double late_s = 0) {
+                           double late_s = 0, double time_constant_s = 0.25 * kPeriodS) {
   Recording run{kPeriodS, prbs_duty(0.6, 0.2, duration_s, kPeriodS), {}, {}};
   const std::vector<double> exact = output_of(kFluid, Channel::acceleration, kPeriodS, run.duty);
   const Eigen::VectorXd felt_m_s2 = OutputModel::with_means(kPeriodS, run.duty, 1e-9).output(kFluid);
   const SensorPath path({exact, std::vector<bool>(exact.size()), false}, kPeriodS);
-  const Eigen::VectorXd readings = path.sampled(felt_m_s2, {-0.75 * kPeriodS - late_s, kPeriodS, 0.25 * kPeriodS});
+  const Eigen::VectorXd readings = path.sampled(felt_m_s2, {-0.75 * kPeriodS - late_s, kPeriodS, time_constant_s});
   run.acceleration_m_s2.assign(readings.begin(), readings.end());
   add_noise(run.acceleration_m_s2, noise_m_s2, 5);
   std::mt19937 random{7};
@@ -140,6 +140,25 @@ TEST(SensorSearch, WhatTheAgeOfTheReadingsHidesIsTheDoubtOfTheDeadTime) {
   EXPECT_TRUE(std::ranges::any_of(at_limit.doubts, [](const Doubt& doubt) {
     return doubt.code == DoubtCode::dead_time_not_determined && is_grave(doubt);
   }));
+}
+
+TEST(SensorSearch, ADelayThatNoSuchSensorHasIsADeadTimeInDoubtAsAWhole) {
+  const Identification none = identified(0.03, 0, std::nullopt);  // and no dead time was asked for
+  EXPECT_NEAR(dead_time_sd_s(none.doubts), 0.0325, 0.001);
+}
+
+TEST(SensorSearch, ASensorThatIsUnlikeItsDataSheetIsADoubt) {
+  const auto is_of_low_pass = [](const Doubt& doubt) {
+    return doubt.code == DoubtCode::sensor_unlike_data_sheet && doubt.parameter == "time_constant_s";
+  };
+  const Identification slow = identify(acceleration_run(12, 0.002, 0, 0, 0, 0.005), one_start());
+  const auto doubt = std::ranges::find_if(slow.doubts, is_of_low_pass);
+  ASSERT_NE(doubt, slow.doubts.end());
+  EXPECT_NEAR(*doubt->value, std::log(slow.best.sensor->time_constant_s / 0.00255) / 0.1, 0.05);
+  const double k = slow.best.free_parameters;
+  EXPECT_NEAR(*doubt->widening, std::sqrt(1 + (*doubt->value * *doubt->value - 1) / k), 1e-9);
+  EXPECT_TRUE(is_grave(*doubt));
+  EXPECT_FALSE(std::ranges::any_of(identify(acceleration_run(12, 0.002, 0), one_start()).doubts, is_of_low_pass));
 }
 
 TEST(SensorSearch, NamesAnOptionOnlyToThoseWhoHaveIt) {

@@ -34,6 +34,8 @@ const robot = (robot_id: string) =>
 
 const kRefusal = new ApiError('It may use more duty.', 409, 'confirm_required');
 
+const kInDoubt = { plant_doubts_text: 'in grave doubt: the search did not converge' };
+
 // The step as an admin sees it, and what was asked of the robots.
 function drawn() {
   const store = new Store({ page_ms: () => 0, utc_ms: () => 0 });
@@ -66,7 +68,7 @@ function drawn() {
     kept: signal(0),
     tuning: { answer_to: (key: string) => (key === 'asked' ? { job_id: 3, result: { feasible: true } } : null) },
     api: {
-      design: (id: number) => Promise.resolve({ design_id: id, name: 'made', document: {} }),
+      design: (id: number) => Promise.resolve({ design_id: id, name: 'made', document: id === 7 ? kInDoubt : {} }),
       push: (id: string, controller: number, is_confirmed: boolean) => ask(`${controller} to ${id}`, is_confirmed),
       restore: (id: string, is_confirmed: boolean) => ask(`restore ${id}`, is_confirmed),
     },
@@ -182,4 +184,14 @@ test('what was tuned is kept only while it is what is asked now', async () => {
   expect(is_disabled()).toBe(true);
   await draw({});
   expect(is_disabled()).toBe(true);
+});
+
+test('what is in doubt about the model that a controller was tuned for stands beside its sending', async () => {
+  const { page, draw } = drawn();
+  await draw({ controller: 8 });
+  expect(page.find('design-push-doubts')).toBeNull();
+  await draw({ controller: 7 });
+  expect(page.find('design-push-doubts')!.text).toBe(
+    'The model that it was tuned for: in grave doubt: the search did not converge.',
+  );
 });

@@ -203,6 +203,12 @@ export function discretised_of(document: unknown): Discretised | null {
   return found?.sections ? found : null;
 }
 
+// What is in doubt about the model that a kept controller was tuned for, in a line; empty: nothing, or nobody has said.
+export function plant_doubts_of(document: unknown): string {
+  const text = (document as { plant_doubts_text?: unknown } | null)?.plant_doubts_text;
+  return typeof text === 'string' ? text : '';
+}
+
 export function plant_of(document: unknown): Plant | null {
   const given = document as Partial<Plant> & { parameters?: Plant };
   const plant = { b3: 1, dead_time_s: 0, ...(given.parameters ?? given) } as Plant;

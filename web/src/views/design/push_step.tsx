@@ -8,7 +8,7 @@ import { clock_time } from '../../format';
 import { may_command, useActs, useAsked } from '../experiments/acts';
 import { change_design } from './address';
 import { compared, sent_form, type Coefficient } from './control_law';
-import { discretised_of, type ControllerInForce } from './design_api';
+import { discretised_of, plant_doubts_of, type ControllerInForce } from './design_api';
 import type { StepProps } from './parts';
 import { Step } from './step';
 import { kMinus, number_text, type StepState } from './words';
@@ -58,6 +58,11 @@ export function PushStep(props: StepProps) {
           <RobotList {...props} />
           {robot && may_command(session) && <ControlLine session={session} robot={robot} />}
           <KeepController {...props} />
+          {kept && plant_doubts_of(kept.document) !== '' && (
+            <p class="design-caution design-note" id="design-push-doubts">
+              The model that it was tuned for: {plant_doubts_of(kept.document)}.
+            </p>
+          )}
           {/* SAFETY: what was confirmed for one robot and controller is not confirmed for another. */}
           <Send
             {...props}

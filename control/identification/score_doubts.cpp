@@ -1,5 +1,5 @@
 // Projects the residuals on what other parameters and another amplitude could make of them.
-#include "control/identification/amplitude_doubt.hpp"
+#include "control/identification/score_doubts.hpp"
 
 #include <Eigen/QR>
 #include <algorithm>
@@ -17,6 +17,7 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr double kDoubtfulF = 60, kDoubtfulShare = 0.1;
+constexpr double kDoubtfulInputF = 5, kDoubtfulInputShare = 0.01;
 constexpr double kFitOfRounding = 100 - 1e-6;  // percent
 constexpr double kWindowS = 1;                 // a clock that is off by 0.5 % drifts by half a sample
 constexpr Index kMostWindows = 60;
@@ -130,49 +131,81 @@ MatrixXd beyond(const Qr& qr, const MatrixXd& columns) {
   return qr.householderQ() * turned;
 }
 
-}  // namespace
+struct Residuals {
+  std::vector<double> sd;  // of each channel, in which all columns are
+  VectorXd column;
+  Index values = 0;  // that count
+};
 
-std::optional<ScoreEvidence> amplitude_evidence(OutputErrorSearch& search, const Recording& recording, const Fit& fit,
-                                                const SearchPoint& point) {
+// None: they are rounding, or the search was cut off.
+std::optional<Residuals> residuals_of(OutputErrorSearch& search, const Fit& fit, const SearchPoint& point) {
   const bool is_rounding = fit.fit_percent >= kFitOfRounding;
   if (is_rounding || (fit.end != SearchEnd::converged && fit.end != SearchEnd::iteration_limit) || search.limit().end())
     return std::nullopt;
   if (fit.sensor && fit.sensor->delay_is_at_limit) return std::nullopt;  // what it lacks follows the steps of the duty
-  const SensorPath* path = search.sensor();
-  const std::vector<VectorXd> residuals = search.residuals(point);
-  std::vector<double> sd;
-  std::vector<MatrixXd> residual_columns;
-  for (const VectorXd& residual : residuals) {
-    sd.push_back(std::max(1e-200, residual.norm()));
-    residual_columns.emplace_back(residual);
+  Residuals residuals;
+  if (search.sensor()) residuals.values = -search.sensor()->bias_terms();
+  std::vector<MatrixXd> columns;
+  for (const VectorXd& residual : search.residuals(point)) {
+    residuals.sd.push_back(std::max(1e-200, residual.norm()));
+    residuals.values += search.counted(residual).size();
+    columns.emplace_back(residual);
   }
+  residuals.column = stacked(columns, residuals.sd);
+  return residuals;
+}
+
+// What `further` explains of what `known` leaves: (3) and (4).
+std::optional<ScoreEvidence> evidence_of(const Residuals& residuals, const MatrixXd& known, const MatrixXd& further,
+                                         int free_parameters) {
+  if (!known.allFinite() || !further.allFinite()) return std::nullopt;
+  const Qr by_known = directions(known, 1e-9);
+  const VectorXd residual = beyond(by_known, residuals.column);
+  const Qr by_further = directions(beyond(by_known, further), kDependent);
+  if (by_further.rank() == 0 || by_further.maxPivot() < kDependent) return std::nullopt;
+  const VectorXd rest = beyond(by_further, residual);
+  const double explained = residual.squaredNorm() - rest.squaredNorm();
+  const double freedom = static_cast<double>(residuals.values - by_known.rank() - by_further.rank());
+  if (!(freedom > 0)) return std::nullopt;
+  const double share = explained / residual.squaredNorm();
+  return ScoreEvidence{
+      .share = share,
+      .f = explained / rest.squaredNorm() * freedom / static_cast<double>(by_further.rank()),
+      .widening = std::sqrt(1 + share * static_cast<double>(residuals.values) / std::max(1, free_parameters))};
+}
+
+}  // namespace
+
+std::optional<ScoreEvidence> amplitude_evidence(OutputErrorSearch& search, const Recording& recording, const Fit& fit,
+                                                const SearchPoint& point) {
+  const auto residuals = residuals_of(search, fit, point);
+  if (!residuals) return std::nullopt;
+  const std::vector<double>& sd = residuals->sd;
   const std::vector<double> velocity_m_s = search.model_velocity_m_s(point);  // late by the dead time already
   SearchPoint prompt = point;
   prompt.model.dead_time_s = 0;
   const MatrixXd linear = side_by_side(other_models(search, recording, point, sd));
   const MatrixXd changing = side_by_side({stacked(search.model_slopes(turned_to_squares(recording.duty), point), sd),
                                           stacked(search.model_slopes(turned_to_squares(velocity_m_s), prompt), sd)});
-  if (!linear.allFinite() || !changing.allFinite()) return std::nullopt;
+  return evidence_of(*residuals, linear, changing, fit.free_parameters);
+}
 
-  const Qr by_linear = directions(linear, 1e-9);
-  const VectorXd residual = beyond(by_linear, stacked(residual_columns, sd));
-  const Qr by_changing = directions(beyond(by_linear, changing), kDependent);
-  if (by_changing.rank() == 0 || by_changing.maxPivot() < kDependent) return std::nullopt;
-  const VectorXd rest = beyond(by_changing, residual);
-  Index values = path ? -path->bias_terms() : 0;
-  for (const VectorXd& of_channel : residuals) values += search.counted(of_channel).size();
-  const double explained = residual.squaredNorm() - rest.squaredNorm();
-  const double freedom = static_cast<double>(values - by_linear.rank() - by_changing.rank());
-  if (!(freedom > 0)) return std::nullopt;
-  const double share = explained / residual.squaredNorm();
-  return ScoreEvidence{
-      .share = share,
-      .f = explained / rest.squaredNorm() * freedom / static_cast<double>(by_changing.rank()),
-      .widening = std::sqrt(1 + share * static_cast<double>(values) / std::max(1, fit.free_parameters))};
+std::optional<ScoreEvidence> input_evidence(OutputErrorSearch& search, const Recording& recording, const Fit& fit,
+                                            const SearchPoint& point) {
+  const auto residuals = residuals_of(search, fit, point);
+  if (!residuals) return std::nullopt;
+  const auto samples = static_cast<Index>(recording.duty.size());
+  const MatrixXd own = side_by_side({stacked(search.jacobians(fit.structure, point), residuals->sd)});
+  const MatrixXd late = side_by_side({stacked(search.late_outputs(delays(samples), point), residuals->sd)});
+  return evidence_of(*residuals, own, late, fit.free_parameters);
 }
 
 bool changes_with_amplitude(const std::optional<ScoreEvidence>& evidence) {
   return evidence && evidence->f > kDoubtfulF && evidence->share >= kDoubtfulShare;
+}
+
+bool follows_input(const std::optional<ScoreEvidence>& evidence) {
+  return evidence && evidence->f > kDoubtfulInputF && evidence->share >= kDoubtfulInputShare;
 }
 
 std::vector<std::string> amplitude_doubts(const std::optional<ScoreEvidence>& evidence, const Recording& recording,
@@ -194,6 +227,23 @@ std::vector<std::string> amplitude_doubts(const std::optional<ScoreEvidence>& ev
     text << "no linear model holds from rest to duty " << largest
          << "; fit runs of one amplitude each, and use a fit near its amplitude only";
   }
+  return {text.str()};
+}
+
+std::vector<std::string> input_doubts(const std::optional<ScoreEvidence>& evidence,
+                                      const std::optional<ScoreEvidence>& amplitude,
+                                      const IdentificationOptions& options) {
+  if (!follows_input(evidence) || changes_with_amplitude(amplitude)) return {};
+  const auto option = [](const std::string& name) { return name.empty() ? name : " (" + name + ")"; };
+  std::ostringstream text;
+  text.precision(3);
+  text << "the residuals follow the duty: another linear model would explain " << 100 * evidence->share
+       << " % of what this one leaves (F = " << evidence->f << ", above " << kDoubtfulInputF << "); ";
+  if (options.structure && *options.structure != Structure::fractional) {
+    text << "identify without a structure that is given" << option(options.names.structure) << ", or ";
+  }
+  text << (options.longest_dead_time_s > 0 ? "look for columns that are shifted in time, or a dead zone of the motor"
+                                           : "search for a dead time" + option(options.names.dead_time));
   return {text.str()};
 }
 

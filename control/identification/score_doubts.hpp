@@ -1,4 +1,5 @@
-// Tests whether a run's parameters change with amplitude: then no linear model holds for all of it.
+// Tests whether the residuals of a fit hold what a better model would have explained: one whose parameters change with
+// amplitude, so that no linear model holds for all of the run, or another linear one.
 //
 //   r = J a + E c + noise                                              (1)   r: residuals of the fit
 //   J: slopes of the output by all parameters, and the columns below    what another linear model could explain
@@ -11,7 +12,10 @@
 // u|u| says nothing if the duty has one magnitude only, v|v| nothing if the speed hardly changes.
 // Not amplitude: what J has besides (an output of the model that comes later, offset, drift and motion before the run
 // in position and velocity; readings of another age in each second, if the sensor's clock was not found). Doubtful is F
-// above 60 with a share of at least 10 %: figures over fluids and seeds are in docs/control.md. Errors: none thrown.
+// above 60 with a share of at least 10 %.
+// Another linear model: J are the slopes by the parameters that were fitted, and E the model's outputs 1, 2, 3, 5, …
+// ticks later, up to a quarter of the record: a dead time, or a path with another response. Doubtful is F above 5 with
+// a share of at least 1 %. Figures of both over fluids and seeds are in docs/control.md. Errors: none thrown.
 #pragma once
 
 #include <optional>
@@ -27,10 +31,19 @@ namespace control {
 std::optional<ScoreEvidence> amplitude_evidence(OutputErrorSearch& search, const Recording& recording, const Fit& fit,
                                                 const SearchPoint& point);
 
+std::optional<ScoreEvidence> input_evidence(OutputErrorSearch& search, const Recording& recording, const Fit& fit,
+                                            const SearchPoint& point);
+
 bool changes_with_amplitude(const std::optional<ScoreEvidence>& evidence);
+bool follows_input(const std::optional<ScoreEvidence>& evidence);
 
 // order_is_forced: the structure was given, and it is not the fractional one; structure_option: how, or empty.
 std::vector<std::string> amplitude_doubts(const std::optional<ScoreEvidence>& evidence, const Recording& recording,
                                           bool order_is_forced, const std::string& structure_option = {});
+
+// Of evidence that amplitude does not explain.
+std::vector<std::string> input_doubts(const std::optional<ScoreEvidence>& evidence,
+                                      const std::optional<ScoreEvidence>& amplitude,
+                                      const IdentificationOptions& options);
 
 }  // namespace control
