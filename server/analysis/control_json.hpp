@@ -44,6 +44,11 @@ struct ModelDoubts {
 Result<ModelDoubts> doubts_from(const nlohmann::json& fit);
 // In one line, for what is computed from the model; empty: nothing is doubted that widens it.
 std::string doubts_in_words(const ModelDoubts& known);
+
+// The same of a model that is kept, or of the one that a kept controller was tuned for. Empty also where nobody has
+// said.
+std::string doubts_about_model(const nlohmann::json& design);
+
 // The grave ones in one line; empty: none is.
 std::string grave_doubts_in_words(const ModelDoubts& known);
 

@@ -124,6 +124,15 @@ std::string doubts_in_words(const ModelDoubts& known) {
   return fmt::format("in doubt: {}", fmt::join(words, "; "));
 }
 
+std::string doubts_about_model(const json& design) {
+  if (!design.is_object()) return {};
+  if (const auto said = design.find("plant_doubts_text"); said != design.end()) {
+    return said->is_string() ? said->get<std::string>() : std::string{};
+  }
+  const auto known = doubts_from(design);
+  return known ? doubts_in_words(*known) : std::string{};
+}
+
 std::string grave_doubts_in_words(const ModelDoubts& known) {
   return fmt::format("{}", fmt::join(words_of(known, control::is_grave), "; "));
 }

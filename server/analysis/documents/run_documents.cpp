@@ -6,9 +6,9 @@
 #include "base/json_text.hpp"
 #include "base/version.hpp"
 #include "server/analysis/comparison/aligned_runs_json.hpp"
+#include "server/analysis/control_json.hpp"
 #include "server/analysis/metrics/metrics_json.hpp"
 #include "server/analysis/report/comparison_report.hpp"
-#include "server/analysis/report/run_report.hpp"
 #include "server/storage/query/run_events.hpp"
 
 namespace server::analysis {
@@ -18,6 +18,7 @@ using nlohmann::json;
 namespace {
 
 constexpr std::size_t kAuditEntriesLookedAt = 1000;
+constexpr std::size_t kMostDesigns = 100;         // in a report
 constexpr std::size_t kReportValues = 4'000'000;  // in memory alone: plots draw four points for a column of pixels
 
 bool goes_on(const Watch& watch, std::size_t done, std::size_t runs, storage::RunId run) {
@@ -100,6 +101,19 @@ asio::awaitable<std::vector<storage::AuditEntry>> RunDocuments::audit_of(const s
   co_return std::move(page.entries);
 }
 
+asio::awaitable<std::vector<DesignOfRun>> RunDocuments::designs_of(storage::RunId run) {
+  storage::DesignFilter filter;
+  filter.run = run;
+  filter.limit = kMostDesigns;
+  std::vector<DesignOfRun> lines;
+  const auto found = co_await parts_.designs.list(filter);
+  for (const storage::Design& design : found) {
+    lines.push_back({design.id, storage::text(design.made.kind), design.made.name,
+                     doubts_about_model(json::parse(design.made.document, nullptr, false))});
+  }
+  co_return lines;
+}
+
 asio::awaitable<std::string> RunDocuments::sha256_of(storage::RunId run) {
   const auto digest = co_await parts_.digester.find(run);
   co_return digest && digest->is_final ? digest->digest.sha256 : std::string{};
@@ -115,6 +129,7 @@ asio::awaitable<Result<std::string>> RunDocuments::report(storage::RunId id, std
   report.trace = std::move(trace->points);
   report.reference = std::move(trace->reference);
   report.metrics = json::parse(found->metrics.document, nullptr, false);
+  report.designs = co_await designs_of(id);
   report.sha256 = co_await sha256_of(id);
   report.audit = co_await audit_of(report.run);
   report.program = base::version();

@@ -15,8 +15,10 @@
 #include "server/analysis/analysis_service.hpp"
 #include "server/analysis/comparison/aligned_runs.hpp"
 #include "server/analysis/comparison/impedance_map.hpp"
+#include "server/analysis/report/run_report.hpp"
 #include "server/runtime/clock.hpp"
 #include "server/runtime/result.hpp"
+#include "server/storage/designs/designs.hpp"
 #include "server/storage/query/history.hpp"
 #include "server/storage/runs/run_digester.hpp"
 #include "server/storage/runs/run_metrics.hpp"
@@ -27,6 +29,7 @@ namespace server::analysis {
 struct DocumentParts {
   AnalysisService& analysis;
   runtime::Clock& clock;
+  storage::Designs& designs;
   storage::RunDigester& digester;
   storage::History& history;
   storage::MetricsOfRuns& metrics;
@@ -73,6 +76,7 @@ class RunDocuments {
   // 0: the run is measured by its own record.
   boost::asio::awaitable<Result<std::int64_t>> reference_time(storage::RunId run);
   boost::asio::awaitable<Result<AlignedRun>> aligned_run(storage::RunId id, const TracesRequest& request);
+  boost::asio::awaitable<std::vector<DesignOfRun>> designs_of(storage::RunId run);
   boost::asio::awaitable<std::string> sha256_of(storage::RunId run);  // of its certificate; empty: it has none yet
   boost::asio::awaitable<std::vector<storage::AuditEntry>> audit_of(const storage::Run& run);
 

@@ -223,6 +223,18 @@ std::string steps(const json& metrics) {
          "believed, within ± 2 sd.</p>\n";
 }
 
+std::string designs(const RunReport& report) {
+  if (report.designs.empty()) return {};
+  std::string out =
+      "<h2>Models and controllers from this run</h2>\n<table><tr><th>Number</th><th>Kind</th><th>Name</th>"
+      "<th>In doubt about the model</th></tr>\n";
+  for (const DesignOfRun& design : report.designs) {
+    out += fmt::format("<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>\n", design.number, design.kind,
+                       html_escaped(design.name), html_escaped(design.doubts));
+  }
+  return out + "</table>\n";
+}
+
 std::string origin(const RunReport& report) {
   std::string out = "<h2>Origin</h2>\n";
   out += report.sha256.empty()
@@ -243,7 +255,7 @@ std::string origin(const RunReport& report) {
 
 std::string html_of(const RunReport& report) {
   return heading(report) + conditions(report.run) + plots(report) + interruptions(report) + steps(report.metrics) +
-         figures(report.metrics) + origin(report) + page_end();
+         figures(report.metrics) + designs(report) + origin(report) + page_end();
 }
 
 }  // namespace server::analysis

@@ -1,4 +1,5 @@
-// A run as one HTML file: conditions, plots, metrics, digest and audit. It loads nothing and has no script.
+// A run as one HTML file: conditions, plots, metrics, what was designed from it, digest and audit. It loads nothing and
+// has no script.
 //
 // Everything that people or robots wrote is escaped. Pure and slow for long runs: call it on a worker.
 #pragma once
@@ -15,11 +16,19 @@
 
 namespace server::analysis {
 
+// A model that was found from the run, or a controller that was designed for one.
+struct DesignOfRun {
+  std::int64_t number = 0;
+  std::string kind, name;
+  std::string doubts;  // about the model, in a line; empty: none, or nobody has said
+};
+
 struct RunReport {
   storage::Run run;
   std::vector<TracePoint> trace;
   std::optional<storage::StoredReference> reference;
   nlohmann::json metrics;                  // as json_of(RunMetrics) gives them
+  std::vector<DesignOfRun> designs;        // newest first
   std::string sha256;                      // of the run's certificate; empty: it has none yet
   std::vector<storage::AuditEntry> audit;  // of the run, newest first
   std::string program;                     // its version

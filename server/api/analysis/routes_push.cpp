@@ -38,13 +38,6 @@ Robot robot_of(const station::RobotSettings* known, const json& body) {
   return robot;
 }
 
-// What is in doubt about the model that the controller was tuned for, in a line; empty: nothing, or nobody has said.
-std::string plant_doubts_of(const storage::Design& design) {
-  const json document = json::parse(design.made.document, nullptr, false);
-  const json doubts = document.is_object() ? document.value("plant_doubts_text", json()) : json();
-  return doubts.is_string() ? doubts.get<std::string>() : std::string{};
-}
-
 // The command for the same robot, by the same caller, with the same age and key.
 http::Request command_request(http::Request request, json body, json controller) {
   body.erase("design_id");
@@ -80,11 +73,12 @@ http::Answer push_controller(PushRoutes parts, http::Request request) {
   http::Response answered = co_await submit_command(parts.commands, std::move(command));
   if (answered.status != 200) co_return answered;
   const json record = json::parse(answered.body, nullptr, false);
-  co_return http::json_response(200, {{"design_id", *id},
-                                      {"plant_doubts_text", plant_doubts_of(*design)},
-                                      {"verified", record.at("state") == "verified"},
-                                      {"command", record},
-                                      {"in_force", controller_in_force(parts.commands.station, robot_id)}});
+  co_return http::json_response(
+      200, {{"design_id", *id},
+            {"plant_doubts_text", analysis::doubts_about_model(json::parse(design->made.document, nullptr, false))},
+            {"verified", record.at("state") == "verified"},
+            {"command", record},
+            {"in_force", controller_in_force(parts.commands.station, robot_id)}});
 }
 
 }  // namespace

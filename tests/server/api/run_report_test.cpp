@@ -54,9 +54,10 @@ TEST(RunReport, EscapesWhatPeopleAndRobotsWrote) {
   storage::AuditEntry entry;
   entry.note.by.actor = entry.note.action = hostile;
   report.audit.push_back(entry);
+  report.designs.push_back({1, "model", hostile, hostile});
   const std::string html = analysis::html_of(report);
   EXPECT_THAT(html, AllOf(Not(HasSubstr("<script")), Not(HasSubstr("('1'")), HasSubstr("&lt;script&gt;")));
-  EXPECT_GE(count_of(html, "&lt;script&gt;alert(&#39;1&#39; &amp; &quot;2&quot;)"), 14U);
+  EXPECT_GE(count_of(html, "&lt;script&gt;alert(&#39;1&#39; &amp; &quot;2&quot;)"), 16U);
 }
 
 TEST(RunReport, LoadsNothing) {
@@ -161,6 +162,30 @@ TEST_F(ReportRouteTest, GivesTheRunAsAFile) {
   EXPECT_THAT(report.body, AllOf(HasSubstr("<h1>a &lt;b&gt; run</h1>"), HasSubstr("run.made"),
                                  HasSubstr(certificate["sha256"].get<std::string>())));
   EXPECT_EQ(ask("GET", "/api/v1/runs/2/report.html").status, 404);
+  EXPECT_THAT(report.body, Not(HasSubstr("Models and controllers")));
+}
+
+TEST_F(ReportRouteTest, NamesTheModelsFoundFromTheRunWithWhatIsInDoubtAboutThem) {
+  connect_robot();
+  ASSERT_EQ(ask("POST", "/api/v1/runs", {{"robot_id", "r1"}, {"name", "first"}}).status, 201);
+  make_samples(*robot, 0, 25);
+  const json doubt{{"code", "search_not_converged"}, {"value", 9}, {"widening", nullptr}};
+  const json model{{"kp", 0.1}, {"b1", 0.006}, {"b2", 0.1}, {"alpha", 1.8}, {"beta", 0.9}};
+  for (const json& doubts : {json::array({doubt}), json::array()}) {
+    const json body{{"kind", "model"},
+                    {"name", doubts.empty() ? "sound" : "<doubtful>"},
+                    {"document", {{"parameters", model}, {"doubts", doubts}, {"widening", nullptr}}},
+                    {"runs", {{{"run_id", 1}}}}};
+    const Answered stored = ask("POST", "/api/v1/designs", body);
+    ASSERT_EQ(stored.status, 201) << stored.body;
+  }
+  clock.run_for(1s);
+  ASSERT_EQ(ask("POST", "/api/v1/runs/1/end").status, 200);
+  clock.run_for(5s);
+  const std::string report = ask("GET", "/api/v1/runs/1/report.html").body;
+  EXPECT_THAT(report, AllOf(HasSubstr("<h2>Models and controllers from this run</h2>"),
+                            HasSubstr("<td>2</td><td>model</td><td>sound</td><td></td>"),
+                            HasSubstr("<td>&lt;doubtful&gt;</td><td>in doubt: the search did not converge")));
 }
 
 }  // namespace
