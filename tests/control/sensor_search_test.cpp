@@ -3,8 +3,11 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <random>
+#include <stop_token>
+#include <thread>
 
 #include "control/identification/fit_summary.hpp"
 #include "control/search/output_error_search.hpp"
@@ -159,6 +162,45 @@ TEST(SensorSearch, ASensorThatIsUnlikeItsDataSheetIsADoubt) {
   EXPECT_NEAR(*doubt->widening, std::sqrt(1 + (*doubt->value * *doubt->value - 1) / k), 1e-9);
   EXPECT_TRUE(is_grave(*doubt));
   EXPECT_FALSE(std::ranges::any_of(identify(acceleration_run(12, 0.002, 0), one_start()).doubts, is_of_low_pass));
+}
+
+// No search that gives a model ends by the time.
+TEST(SensorSearch, ABusyMachineChangesNoBit) {
+  IdentificationOptions options = one_start();
+  options.further_starts = 1;
+  options.tries_dead_time = true;
+  const Recording run = acceleration_run(6, 0.02, 0.01, 0, 0.03);
+  const Identification alone = identify(run, options);
+  Identification beside;
+  {
+    const auto spin = [](const std::stop_token& ended) {
+      while (!ended.stop_requested()) continue;
+    };
+    const std::array<std::jthread, 3> busy{std::jthread{spin}, std::jthread{spin}, std::jthread{spin}};
+    beside = identify(run, options);
+  }
+  const auto numbers = [](const Identification& found) {
+    const Fit& fit = found.best;
+    std::vector<double> all{fit.model.kp,
+                            fit.model.b1,
+                            fit.model.b2,
+                            fit.model.dead_time_s,
+                            fit.sse,
+                            fit.aic,
+                            fit.sensor->delay_s,
+                            fit.sensor->period_s,
+                            found.input->f,
+                            found.amplitude->f,
+                            fit.whiteness_p_value,
+                            double(fit.iterations)};
+    for (const auto& sigma : fit.one_sigma) all.push_back(sigma.value_or(-1));
+    for (const Doubt& doubt : found.doubts) all.push_back(doubt.value.value_or(-1));
+    all.insert(all.end(), fit.acceleration_residual_m_s2.begin(), fit.acceleration_residual_m_s2.end());
+    return all;
+  };
+  EXPECT_GT(alone.best.model.dead_time_s, 0);
+  EXPECT_EQ(numbers(beside), numbers(alone));
+  EXPECT_EQ(beside.warnings, alone.warnings);
 }
 
 TEST(SensorSearch, NamesAnOptionOnlyToThoseWhoHaveIt) {
