@@ -71,7 +71,8 @@ std::string in_words(const Doubt& doubt) {
       return "the residuals follow the duty: another linear model would explain " + rounded(100 * value, 2) +
              " % of what this one leaves";
     case DoubtCode::sensor_unlike_data_sheet:
-      return "the sensor's " + doubt.parameter + " is " + rounded(value, 2) + " sds off its data sheet";
+      return std::string{"the sensor's "} + (doubt.parameter == "period_s" ? "clock" : "low pass") + " is " +
+             rounded(value, 2) + " sds off its data sheet";
     case DoubtCode::runs_disagree:
       return "the runs do not agree on one model: parameters of their own explain " + rounded(100 * value, 2) +
              " % of what the common ones leave";

@@ -1,6 +1,8 @@
 // Names with units, as everywhere.
 #include "server/analysis/metrics/metrics_json.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <functional>
@@ -99,6 +101,18 @@ json differences(std::span<const storage::Run> runs) {
   return differing;
 }
 
+// A loop that settles by its estimate has settled in its own belief, and the band is as far as it may be trusted.
+std::string position_doubt(const json& step) {
+  const json& sd_m = step.at("position_sd_m");
+  const bool is_belief = step.at("position_source") == "estimate";
+  if (!sd_m.is_number()) return "how exact the position is, is not known: this shows the belief only";
+  constexpr double kMmPerM = 1e3;
+  const double within_mm = 2 * kMmPerM * sd_m.get<double>(), band_mm = kMmPerM * step.at("band_m").get<double>();
+  if (within_mm <= band_mm) return {};
+  return fmt::format("± {:.2g} mm is {:.2g} times the band of {:.2g} mm: this shows {}", within_mm, within_mm / band_mm,
+                     band_mm, is_belief ? "the belief only" : "no settling within it");
+}
+
 }  // namespace
 
 json json_of(const std::optional<EstimateError>& error) {
@@ -142,6 +156,10 @@ void add_missed_ticks(json& metrics, const storage::Run& run) {
   json& figures = metrics["figures"];
   figures["missed_ticks"] = run.missed ? json(run.missed->count) : json(nullptr);
   figures["longest_missed_ticks"] = run.missed ? json(run.missed->longest) : json(nullptr);
+}
+
+void add_position_doubts(json& metrics) {
+  for (json& step : metrics["steps"]) step["position_doubt"] = position_doubt(step);
 }
 
 json comparison_json(std::span<const storage::Run> runs, std::span<const json> documents) {

@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include "server/analysis/documents/run_documents.hpp"
+#include "server/analysis/metrics/metrics_json.hpp"
 #include "server/api/analysis/analysis_routes.hpp"
 #include "server/api/bodies/document_body.hpp"
 #include "server/api/bodies/query_params.hpp"
@@ -17,6 +18,7 @@ http::Answer get_metrics(DocumentRoutes parts, http::Request request) {
   const auto found = co_await parts.documents.metrics(*id);
   if (!found) co_return http::problem(found.error());
   json out = json::parse(found->metrics.document, nullptr, false);
+  analysis::add_position_doubts(out);
   out["run_id"] = *id;
   out["version"] = found->metrics.version;
   out["program"] = found->metrics.program;

@@ -36,6 +36,11 @@ void write_run(const json& metrics, std::ostream& out) {
                sd_m.is_number() ? cell(2 * sd_m.get<double>(), 3) : "not known", step.at("position_source")});
   }
   steps.write(out);
+  for (const json& step : metrics.at("steps")) {
+    if (const auto doubt = step.value("position_doubt", std::string{}); !doubt.empty()) {
+      fmt::print(out, "{} at {} s: {}\n", step.at("cause").get<std::string>(), number_text(step.at("at_s")), doubt);
+    }
+  }
 }
 
 void write_metric_rows(const MetricsQuestion& options, const char* title, const char* missing, const json& rows,

@@ -6,6 +6,8 @@
 
 #include <cmath>
 #include <optional>
+#include <string>
+#include <vector>
 
 #include "server/cli/terminal/output.hpp"
 
@@ -65,6 +67,7 @@ json comparison_of(const json& metrics, const json& tuning) {
                      {"target_m", step.at("target_m")},
                      {"position_source", step.at("position_source")},
                      {"position_sd_m", step.at("position_sd_m")},
+                     {"position_doubt", step.value("position_doubt", "")},
                      {"measured", measures_of(step)},
                      {"predicted", predicted_for(step, tuning)}});
   }
@@ -72,6 +75,7 @@ json comparison_of(const json& metrics, const json& tuning) {
 }
 
 void write_comparison(std::ostream& out, const json& steps) {
+  std::vector<std::string> doubts;
   Table table{{"step", "settling (s)", "overshoot (%)", "rise (s)", "error (mm)", "<position"}};
   for (const json& step : steps) {
     const std::string name = fmt::format("{} {:.4g} to {:.4g} m", step.at("cause").get<std::string>(),
@@ -81,8 +85,12 @@ void write_comparison(std::ostream& out, const json& steps) {
     add_row(table, name + ", measured", step.at("measured"),
             fmt::format("{}, ± {}", step.at("position_source").get<std::string>(), within));
     add_row(table, name + ", predicted", step.at("predicted"), "");
+    if (const auto doubt = step.value("position_doubt", std::string{}); !doubt.empty()) {
+      doubts.push_back(name + ": " + doubt);
+    }
   }
   table.write(out);
+  for (const std::string& doubt : doubts) fmt::print(out, "{}\n", doubt);
 }
 
 }  // namespace server::cli

@@ -83,6 +83,20 @@ TEST(RunFigures, OfARunWithoutSamplesSayNothing) {
   EXPECT_EQ(figure({}, "position_range_m"), -1);
 }
 
+// A loop on the estimate settles in its own belief.
+TEST(PositionDoubt, IsThatOfAPositionLessExactThanTheBand) {
+  const auto said = [](const char* source, const json& sd_m) {
+    json metrics{{"steps", {{{"position_source", source}, {"position_sd_m", sd_m}, {"band_m", 0.002}}}}};
+    analysis::add_position_doubts(metrics);
+    return metrics["steps"][0]["position_doubt"].get<std::string>();
+  };
+  EXPECT_EQ(said("known", 0), "");
+  EXPECT_EQ(said("estimate", 0.001), "") << "± 2 sd are the band";
+  EXPECT_EQ(said("estimate", 0.03), "± 60 mm is 30 times the band of 2 mm: this shows the belief only");
+  EXPECT_EQ(said("outside", 0.002), "± 4 mm is 2 times the band of 2 mm: this shows no settling within it");
+  EXPECT_EQ(said("estimate", nullptr), "how exact the position is, is not known: this shows the belief only");
+}
+
 TEST(Repeatability, IsThatOfIso5725) {
   const std::vector<std::optional<double>> values{1.0, 2.0, std::nullopt, 3.0};
   const auto result = analysis::repeatability_of(values);

@@ -30,6 +30,11 @@ json step_json(const char* cause, double start_m, double target_m, double settli
           {"steady_state_error_m", 1e-4}};
 }
 
+json doubted(json step) {
+  step["position_doubt"] = "± 60 mm is 30 times the band of 2 mm: this shows the belief only";
+  return step;
+}
+
 // Answers as the API does; an experiment takes three looks, a job two.
 class PlayedStation {
  public:
@@ -44,7 +49,7 @@ class PlayedStation {
       measured_run = path;
       return {200,
               {{"steps",
-                {step_json("setpoint", 0, 0.1, 1.9), step_json("disturbance", 0.05, 0.1, 1.1),
+                {step_json("setpoint", 0, 0.1, 1.9), doubted(step_json("disturbance", 0.05, 0.1, 1.1)),
                  step_json("setpoint", 0.1, 0.3, 2.5)}}},
               ""};
     }
@@ -213,6 +218,7 @@ TEST_F(AutotuneTest, AsksForEachStageInOrderAndComparesAtTheEnd) {
   EXPECT_THAT(out.str(), HasSubstr("setpoint 0 to 0.1 m, measured"));
   EXPECT_THAT(out.str(), HasSubstr("1.90"));
   EXPECT_THAT(out.str(), HasSubstr("1.77"));
+  EXPECT_THAT(out.str(), HasSubstr("disturbance 0.05 to 0.1 m: ± 60 mm is 30 times the band")) << "as the station says";
   EXPECT_THAT(out.str(), HasSubstr("robot controller sim-1 --restore"));
   EXPECT_THAT(progress.str(), HasSubstr("warning: b1 and alpha are hardly told apart"));
   EXPECT_THAT(progress.str(), HasSubstr("  running, step 2 of 9"));

@@ -10,8 +10,7 @@ import { is_in_region, regions_of } from '../../src/views/design/region_map';
 import { line_of } from '../../src/views/design/step_plots';
 import { inside, summary_of } from '../../src/views/design/tune_result';
 import { tune_body } from '../../src/views/design/tune_step';
-
-import { controller_note, predicted_for } from '../../src/views/design/verify_step';
+import { controller_note, predicted_for, verify_state } from '../../src/views/design/verify_step';
 import { fixed_text, infeasible_text, number_text, state_of } from '../../src/views/design/words';
 
 test('what a hand asks is rounded and stays within the sliders', () => {
@@ -220,4 +219,12 @@ test('a run is compared with the controller that the design has sent, not with w
   expect(controller_note(12, 4, sent)?.is_other).toBe(true);
   for (const pushed of [null, { ...sent, design_id: 5 }, { ...sent, verified: false }])
     expect(controller_note(11, 4, pushed)?.text).toMatch(/is not known/);
+});
+
+test('a run whose position is less exact than the band is not said to have verified anything', () => {
+  const design = { ...kNothing, verified: 12 };
+  expect(verify_state(design, 'sim-1', '', [{ position_doubt: '' }, {}]).text).toBe('run 12');
+  expect(verify_state(design, 'sim-1', '', [{}, { position_doubt: '± 60 mm is 30 times the band' }]).text).toBe(
+    'run 12, which does not tell where the robot was',
+  );
 });

@@ -67,7 +67,7 @@ export function VerifyStep({ session, work, design, runs, tune }: StepProps) {
       number={5}
       name="verify"
       title="Run and compare"
-      state={verify_state(design, robot_id, metrics.problem)}
+      state={verify_state(design, robot_id, metrics.problem, found?.steps ?? [])}
     >
       <div class="design-columns">
         <div>
@@ -118,9 +118,20 @@ export function VerifyStep({ session, work, design, runs, tune }: StepProps) {
 const experiment_link = (robot_id: string) =>
   format({ view: 'experiments', parts: ['new'], query: { profile: 'figure_7', robot: robot_id } });
 
-function verify_state(design: StepProps['design'], robot_id: string, problem: string): StepState {
+export function verify_state(
+  design: StepProps['design'],
+  robot_id: string,
+  problem: string,
+  steps: Pick<StepMeasures, 'position_doubt'>[],
+): StepState {
   if (problem !== '') return { kind: 'failed', text: `failed: ${problem}` };
-  if (design.verified !== null) return { kind: 'done', text: `run ${design.verified}` };
+  // A loop on the robot's estimate settles in its belief, whether or not the robot does.
+  const is_belief = steps.some(({ position_doubt }) => position_doubt);
+  if (design.verified !== null)
+    return {
+      kind: 'done',
+      text: `run ${design.verified}${is_belief ? ', which does not tell where the robot was' : ''}`,
+    };
   if (robot_id === '') return { kind: 'needs', text: 'needs a robot' };
   return { kind: 'ready', text: 'ready' };
 }
@@ -167,6 +178,7 @@ function Compared({ session, work, steps, tuned, run_id }: ComparedProps) {
           </tbody>
         </table>
       </div>
+      <PositionDoubts steps={steps} />
       {tuned?.feasible && (
         <VerifyPlots
           session={session}
@@ -184,14 +196,31 @@ function Compared({ session, work, steps, tuned, run_id }: ComparedProps) {
   );
 }
 
+// Nothing where the positions are known within the settling band.
+function PositionDoubts({ steps }: { steps: StepMeasures[] }) {
+  const doubted = steps.filter(({ position_doubt }) => position_doubt);
+  if (doubted.length === 0) return null;
+  return (
+    <ul class="design-sentences design-caution" id="design-position-doubts">
+      {doubted.map((step, at) => (
+        <li key={at}>
+          {step_name(step)}: {step.position_doubt}.
+        </li>
+      ))}
+    </ul>
+  );
+}
+
+const step_name = (step: StepMeasures) =>
+  `${step.cause}, ${millimetres(step.start_m, 0)} to ${millimetres(step.target_m, 0)} mm`;
+
 function Pair({ step, predicted }: { step: StepMeasures; predicted: Measures | null }) {
-  const name = `${step.cause}, ${millimetres(step.start_m, 0)} to ${millimetres(step.target_m, 0)} mm`;
   const source =
     step.position_source === 'outside' ? 'outside' : step.position_source === 'known' ? 'known' : 'estimate';
   return (
     <>
       <tr>
-        <th scope="row">{name}</th>
+        <th scope="row">{step_name(step)}</th>
         <Numbers measures={step} />
         <td>
           {source} {source !== 'known' && `${plus_minus(step.position_sd_m)} mm`}

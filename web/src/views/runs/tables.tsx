@@ -87,6 +87,14 @@ export function Steps({ page }: { page: RunPage }) {
             ' What is measured by the robot’s own estimate is how well it follows its belief.'}
         </p>
       )}
+      {steps.map(
+        (step) =>
+          step.position_doubt && (
+            <p class="quiet" key={`${step.span}-${step.first_seq}`}>
+              {since_text(step.at_s)}: {step.position_doubt}.
+            </p>
+          ),
+      )}
     </section>
   );
 }
