@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <sstream>
 #include <utility>
 
@@ -34,18 +35,6 @@ void add_residuals(const Fit& fit, const std::optional<ScoreEvidence>& amplitude
     doubts.push_back({DoubtCode::residuals_not_white, fit.colour_factor, {}, fit.colour_factor});
   }
   if (fit.drift_factor > 1) doubts.push_back({DoubtCode::residuals_drift, fit.drift_factor, {}, fit.drift_factor});
-}
-
-void add_sensor(const Fit& fit, std::vector<Doubt>& doubts) {
-  if (!fit.sensor) return;
-  const double low_pass_sds = std::log(fit.sensor->time_constant_s / kDataSheetTimeConstantS) / kLowPassSd;
-  const std::array<std::pair<const char*, double>, 2> off{
-      {{"time_constant_s", low_pass_sds}, {"period_s", fit.sensor->clock_off / kClockSd}}};
-  for (const auto& [name, sds] : off) {
-    if (!(std::abs(sds) > kFarSds)) continue;
-    const double widening = std::sqrt(1 + (sds * sds - 1) / std::max(1, fit.free_parameters));
-    doubts.push_back({DoubtCode::sensor_unlike_data_sheet, std::abs(sds), name, widening});
-  }
 }
 
 std::string rounded(double value, int digits) {
@@ -107,12 +96,26 @@ double dead_time_sd_s(std::span<const Doubt> doubts) {
   return found == doubts.end() ? 0 : found->value.value_or(0);
 }
 
+std::vector<Doubt> sensor_doubts(const Fit& fit) {
+  if (!fit.sensor) return {};
+  std::vector<Doubt> doubts;
+  const double low_pass_sds = std::log(fit.sensor->time_constant_s / kDataSheetTimeConstantS) / kLowPassSd;
+  const std::array<std::pair<const char*, double>, 2> off{
+      {{"time_constant_s", low_pass_sds}, {"period_s", fit.sensor->clock_off / kClockSd}}};
+  for (const auto& [name, sds] : off) {
+    if (!(std::abs(sds) > kFarSds)) continue;
+    const double widening = std::sqrt(1 + (sds * sds - 1) / std::max(1, fit.free_parameters));
+    doubts.push_back({DoubtCode::sensor_unlike_data_sheet, std::abs(sds), name, widening});
+  }
+  return doubts;
+}
+
 std::vector<Doubt> doubts_about(const Fit& fit, const std::optional<ScoreEvidence>& amplitude,
                                 const std::optional<ScoreEvidence>& input, double share_used) {
   std::vector<Doubt> doubts;
   add_search(fit, doubts);
   add_residuals(fit, amplitude, input, doubts);
-  add_sensor(fit, doubts);
+  std::ranges::move(sensor_doubts(fit), std::back_inserter(doubts));
   for (const std::size_t i : undetermined_parameters(fit)) {
     std::optional<double> sigma = fit.one_sigma[i];
     if (sigma && !is_order(i)) *sigma /= parameters_of(fit.model)[i];

@@ -79,10 +79,13 @@ Identification identify(const Recording& recording, const IdentificationOptions&
   check_options(options, recording);
   const double deadline_s = steady_now_s() + options.time_limit_s;
   Identification found = identified(recording, options);
-  if (!asks_for_dead_time(recording, options, found.best, found.input)) return found;
+  if (!asks_for_dead_time(recording, options, found.best, found.amplitude, found.input)) return found;
   Identification late = identified(recording, with_dead_time(options, recording, deadline_s - steady_now_s()));
   if (late.best.end == SearchEnd::time_limit) return late;
-  return is_explained_better(late, found) ? late : found;
+  const bool by_acceleration = found.best.sensor.has_value();
+  if (!is_explained_better(late.best, found.best, by_acceleration)) return found;
+  if (!by_acceleration) late.warnings.push_back(dead_time_in_words(late.best, recording.dt_s));
+  return late;
 }
 
 Fit evaluate(const FractionalModel& model, const Recording& recording, const IdentificationOptions& options) {

@@ -51,6 +51,7 @@ Recording make_recording(std::span<const double> time_s, std::span<const double>
 struct JointRun {
   Fit fit;  // the common model; offset, clock, sensor, residuals and their quality are this run's
   std::vector<std::string> warnings;
+  std::optional<ScoreEvidence> amplitude, input;  // of this run; none: nothing to compare
 };
 
 struct Identification {

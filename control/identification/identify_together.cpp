@@ -44,26 +44,21 @@ void check_together(std::span<const Recording> recordings, const IdentificationO
   }
 }
 
-// Of one run.
-struct JointEvidence {
-  std::optional<ScoreEvidence> amplitude, input;
-};
-
 void keep_clearer(const std::optional<ScoreEvidence>& evidence, std::optional<ScoreEvidence>& kept) {
   if (evidence && (!kept || evidence->f > kept->f)) kept = evidence;
 }
 
 // What concerns one run only.
 std::vector<std::string> doubts_of(JointSearch& search, std::size_t i, const Recording& recording,
-                                   const IdentificationOptions& options, const Fit& fit,
-                                   const JointEvidence& evidence) {
+                                   const IdentificationOptions& options, const JointRun& run) {
+  const Fit& fit = run.fit;
   std::vector<std::string> warnings;
   append(warnings, unit_doubts(recording));
   append(warnings, lag_doubts(recording, options, fit));
   append(warnings, second_opinions(search.of_run(i), recording, options, fit));
   const bool order_is_forced = options.structure && *options.structure != Structure::fractional;
-  append(warnings, amplitude_doubts(evidence.amplitude, recording, order_is_forced, options.names.structure));
-  append(warnings, input_doubts(evidence.input, evidence.amplitude, options));
+  append(warnings, amplitude_doubts(run.amplitude, recording, order_is_forced, options.names.structure));
+  append(warnings, input_doubts(run.input, run.amplitude, options));
   append(warnings, residual_doubts(search.of_run(i), recording, options, fit));
   return warnings;
 }
@@ -71,13 +66,29 @@ std::vector<std::string> doubts_of(JointSearch& search, std::size_t i, const Rec
 void add_runs(JointSearch& search, std::span<const Recording> recordings, const IdentificationOptions& options,
               const JointResult& found, JointFit fit, Identification& result) {
   for (std::size_t i = 0; i < recordings.size(); ++i) {
-    JointRun run{std::move(fit.runs[i]), {}};
-    const JointEvidence evidence{amplitude_evidence(search.of_run(i), recordings[i], run.fit, found.points[i]),
-                                 input_evidence(search.of_run(i), recordings[i], run.fit, found.points[i])};
-    keep_clearer(evidence.amplitude, result.amplitude);
-    keep_clearer(evidence.input, result.input);
-    run.warnings = doubts_of(search, i, recordings[i], options, run.fit, evidence);
+    JointRun run{std::move(fit.runs[i]), {}, {}, {}};
+    run.amplitude = amplitude_evidence(search.of_run(i), recordings[i], run.fit, found.points[i]);
+    run.input = input_evidence(search.of_run(i), recordings[i], run.fit, found.points[i]);
+    keep_clearer(run.amplitude, result.amplitude);
+    if (follows_input(run.input) && !changes_with_amplitude(run.amplitude)) keep_clearer(run.input, result.input);
+    run.warnings = doubts_of(search, i, recordings[i], options, run);
     result.runs.push_back(std::move(run));
+  }
+}
+
+// The farthest of the runs, of each parameter of a sensor.
+void add_sensors(Identification& result) {
+  for (const JointRun& run : result.runs) {
+    for (Doubt& doubt : sensor_doubts(run.fit)) {
+      const auto same = std::ranges::find_if(result.doubts, [&doubt](const Doubt& one) {
+        return one.code == doubt.code && one.parameter == doubt.parameter;
+      });
+      if (same == result.doubts.end()) {
+        result.doubts.push_back(std::move(doubt));
+      } else if (doubt.value > same->value) {
+        *same = std::move(doubt);
+      }
+    }
   }
 }
 
@@ -112,6 +123,7 @@ Identification identified(std::span<const Recording> recordings, const Identific
   add_rival(result.compared, warnings);
   if (search.is_out_of_time()) return out_of_time();  // a doubt may be missing
   result.doubts = doubts_about(result.best, result.amplitude, result.input, share_used(recordings));
+  add_sensors(result);
   if (disagreeing) {
     result.doubts.push_back({DoubtCode::runs_disagree, disagreeing->share, {}, disagreeing->widening});
   }
@@ -128,16 +140,21 @@ Identification identify_together(std::span<const Recording> recordings, const Id
   check_together(recordings, options);
   const double deadline_s = steady_now_s() + options.time_limit_s;
   Identification found = identified(recordings, options);
-  bool asks = false;
+  bool asks = false, by_acceleration = false;
   for (std::size_t i = 0; i < found.runs.size(); ++i) {
-    asks = asks || asks_for_dead_time(recordings[i], options, found.runs[i].fit, found.input);
+    const JointRun& run = found.runs[i];
+    const bool run_asks = asks_for_dead_time(recordings[i], options, run.fit, run.amplitude, run.input);
+    asks = asks || run_asks;
+    by_acceleration = by_acceleration || (run_asks && run.fit.sensor);
   }
   if (!asks) return found;
   const Recording& shortest = *std::ranges::min_element(
       recordings, {}, [](const Recording& one) { return one.dt_s * static_cast<double>(one.duty.size()); });
   Identification late = identified(recordings, with_dead_time(options, shortest, deadline_s - steady_now_s()));
   if (late.best.end == SearchEnd::time_limit) return late;
-  return is_explained_better(late, found) ? late : found;
+  if (!is_explained_better(late.best, found.best, by_acceleration)) return found;
+  if (!by_acceleration) late.warnings.push_back(dead_time_in_words(late.best, shortest.dt_s));
+  return late;
 }
 
 }  // namespace control

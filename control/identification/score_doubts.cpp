@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "control/identification/residual_doubts.hpp"
+#include "control/search/fit_statistics.hpp"
 
 namespace control {
 namespace {
@@ -17,7 +18,8 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr double kDoubtfulF = 60, kDoubtfulShare = 0.1;
-constexpr double kDoubtfulInputF = 5, kDoubtfulInputShare = 0.01;
+constexpr double kDoubtfulInputF = 5, kDoubtfulInputShare = 0.01, kSearchedInputF = 3;
+constexpr double kFewestPerDirection = 10;     // values, so that this F is no chance
 constexpr double kFitOfRounding = 100 - 1e-6;  // percent
 constexpr double kWindowS = 1;                 // a clock that is off by 0.5 % drifts by half a sample
 constexpr Index kMostWindows = 60;
@@ -70,17 +72,17 @@ MatrixXd motions(Index samples, Index channels) {
   return all;
 }
 
-// What other linear models would add to the output, and another reading of the sensor.
-std::vector<MatrixXd> other_models(OutputErrorSearch& search, const Recording& recording, const SearchPoint& point,
-                                   const std::vector<double>& sd) {
-  std::vector<MatrixXd> all{stacked(search.jacobians(Structure::fractional, point), sd)};
+// Slopes by the parameters of a structure, and what neither model nor duty did: another reading of the sensor, or a
+// drift of the position.
+std::vector<MatrixXd> own_and_disturbed(OutputErrorSearch& search, const Recording& recording, Structure structure,
+                                        const SearchPoint& point, const std::vector<double>& sd) {
+  std::vector<MatrixXd> all{stacked(search.jacobians(structure, point), sd)};
   const auto samples = static_cast<Index>(recording.duty.size());
   if (const SensorPath* path = search.sensor()) {
     const auto ticks_in_window = static_cast<Index>(std::ceil(kWindowS / recording.dt_s));
     const Index window = std::max(ticks_in_window, samples / kMostWindows + 1);
-    if (!path->has_own_clock()) all.push_back(ages(all[0], search.free_parameters(Structure::fractional), window));
+    if (!path->has_own_clock()) all.push_back(ages(all[0], search.free_parameters(structure), window));
   } else {
-    all.push_back(stacked(search.late_outputs(delays(samples), point), sd));
     MatrixXd moved = motions(all[0].rows() / std::ssize(sd), std::ssize(sd));
     if (const PositionTimes* times = search.position_times()) {
       for (Index j = 0; j < moved.cols(); ++j) moved.col(j) = times->weighed(moved.col(j));
@@ -155,9 +157,15 @@ std::optional<Residuals> residuals_of(OutputErrorSearch& search, const Fit& fit,
   return residuals;
 }
 
-// What `further` explains of what `known` leaves: (3) and (4).
-std::optional<ScoreEvidence> evidence_of(const Residuals& residuals, const MatrixXd& known, const MatrixXd& further,
-                                         int free_parameters) {
+struct Explained {
+  double share = 0, f = 0;  // (3) and (4)
+  double directions = 0;    // of `further`, beyond `known`
+  double freedom = 0;
+  double colour = 1;  // values per independent one, of what is left
+};
+
+// What `further` explains of what `known` leaves.
+std::optional<Explained> explained_by(const Residuals& residuals, const MatrixXd& known, const MatrixXd& further) {
   if (!known.allFinite() || !further.allFinite()) return std::nullopt;
   const Qr by_known = directions(known, 1e-9);
   const VectorXd residual = beyond(by_known, residuals.column);
@@ -167,11 +175,16 @@ std::optional<ScoreEvidence> evidence_of(const Residuals& residuals, const Matri
   const double explained = residual.squaredNorm() - rest.squaredNorm();
   const double freedom = static_cast<double>(residuals.values - by_known.rank() - by_further.rank());
   if (!(freedom > 0)) return std::nullopt;
-  const double share = explained / residual.squaredNorm();
-  return ScoreEvidence{
-      .share = share,
-      .f = explained / rest.squaredNorm() * freedom / static_cast<double>(by_further.rank()),
-      .widening = std::sqrt(1 + share * static_cast<double>(residuals.values) / std::max(1, free_parameters))};
+  const auto directions_more = static_cast<double>(by_further.rank());
+  return Explained{.share = explained / residual.squaredNorm(),
+                   .f = explained / rest.squaredNorm() * freedom / directions_more,
+                   .directions = directions_more,
+                   .freedom = freedom,
+                   .colour = samples_per_independent_one(rest)};
+}
+
+double widening_by(double share, const Residuals& residuals, const Fit& fit) {
+  return std::sqrt(1 + share * static_cast<double>(residuals.values) / std::max(1, fit.free_parameters));
 }
 
 }  // namespace
@@ -184,10 +197,14 @@ std::optional<ScoreEvidence> amplitude_evidence(OutputErrorSearch& search, const
   const std::vector<double> velocity_m_s = search.model_velocity_m_s(point);  // late by the dead time already
   SearchPoint prompt = point;
   prompt.model.dead_time_s = 0;
-  const MatrixXd linear = side_by_side(other_models(search, recording, point, sd));
+  std::vector<MatrixXd> linear = own_and_disturbed(search, recording, Structure::fractional, point, sd);
+  const auto samples = static_cast<Index>(recording.duty.size());
+  if (!search.sensor()) linear.push_back(stacked(search.late_outputs(delays(samples), point), sd));
   const MatrixXd changing = side_by_side({stacked(search.model_slopes(turned_to_squares(recording.duty), point), sd),
                                           stacked(search.model_slopes(turned_to_squares(velocity_m_s), prompt), sd)});
-  return evidence_of(*residuals, linear, changing, fit.free_parameters);
+  const auto found = explained_by(*residuals, side_by_side(linear), changing);
+  if (!found) return std::nullopt;
+  return ScoreEvidence{found->share, found->f, widening_by(found->share, *residuals, fit)};
 }
 
 std::optional<ScoreEvidence> input_evidence(OutputErrorSearch& search, const Recording& recording, const Fit& fit,
@@ -195,9 +212,13 @@ std::optional<ScoreEvidence> input_evidence(OutputErrorSearch& search, const Rec
   const auto residuals = residuals_of(search, fit, point);
   if (!residuals) return std::nullopt;
   const auto samples = static_cast<Index>(recording.duty.size());
-  const MatrixXd own = side_by_side({stacked(search.jacobians(fit.structure, point), residuals->sd)});
+  const MatrixXd own = side_by_side(own_and_disturbed(search, recording, fit.structure, point, residuals->sd));
   const MatrixXd late = side_by_side({stacked(search.late_outputs(delays(samples), point), residuals->sd)});
-  return evidence_of(*residuals, own, late, fit.free_parameters);
+  const auto found = explained_by(*residuals, own, late);
+  if (!found || found->freedom < kFewestPerDirection * found->directions) return std::nullopt;
+  const double by_chance = found->colour * found->directions / static_cast<double>(residuals->values);
+  return ScoreEvidence{found->share, found->f / found->colour,
+                       widening_by(std::max(0.0, found->share - by_chance), *residuals, fit)};
 }
 
 bool changes_with_amplitude(const std::optional<ScoreEvidence>& evidence) {
@@ -207,6 +228,8 @@ bool changes_with_amplitude(const std::optional<ScoreEvidence>& evidence) {
 bool follows_input(const std::optional<ScoreEvidence>& evidence) {
   return evidence && evidence->f > kDoubtfulInputF && evidence->share >= kDoubtfulInputShare;
 }
+
+bool may_lack_dead_time(const std::optional<ScoreEvidence>& input) { return input && input->f > kSearchedInputF; }
 
 std::vector<std::string> amplitude_doubts(const std::optional<ScoreEvidence>& evidence, const Recording& recording,
                                           bool order_is_forced, const std::string& structure_option) {

@@ -13,9 +13,11 @@
 // Not amplitude: what J has besides (an output of the model that comes later, offset, drift and motion before the run
 // in position and velocity; readings of another age in each second, if the sensor's clock was not found). Doubtful is F
 // above 60 with a share of at least 10 %.
-// Another linear model: J are the slopes by the parameters that were fitted, and E the model's outputs 1, 2, 3, 5, …
-// ticks later, up to a quarter of the record: a dead time, or a path with another response. Doubtful is F above 5 with
-// a share of at least 1 %. Figures of both over fluids and seeds are in docs/control.md. Errors: none thrown.
+// Another linear model: J are the slopes by the parameters that were fitted with what is no amplitude in any case, and
+// E the model's outputs 1, 2, 3, 5, … ticks later, up to a quarter of the record: a dead time, or a path with another
+// response. F is divided by n/n_effective of what is left, and the widening counts what chance does not explain.
+// Doubtful is F above 5 with a share of at least 1 %; fewer than 10 values for a column of E say nothing. Figures of
+// both over fluids and seeds are in docs/control.md. Errors: none thrown.
 #pragma once
 
 #include <optional>
@@ -36,6 +38,7 @@ std::optional<ScoreEvidence> input_evidence(OutputErrorSearch& search, const Rec
 
 bool changes_with_amplitude(const std::optional<ScoreEvidence>& evidence);
 bool follows_input(const std::optional<ScoreEvidence>& evidence);
+bool may_lack_dead_time(const std::optional<ScoreEvidence>& input);  // F above 3: worth a search, which AIC judges
 
 // order_is_forced: the structure was given, and it is not the fractional one; structure_option: how, or empty.
 std::vector<std::string> amplitude_doubts(const std::optional<ScoreEvidence>& evidence, const Recording& recording,

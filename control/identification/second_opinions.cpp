@@ -320,10 +320,14 @@ std::vector<std::string> lag_doubts(const Recording& recording, const Identifica
 }
 
 bool asks_for_dead_time(const Recording& recording, const IdentificationOptions& options, const Fit& fit,
-                        const std::optional<ScoreEvidence>& input) {
+                        const std::optional<ScoreEvidence>& amplitude, const std::optional<ScoreEvidence>& input) {
   if (!options.tries_dead_time || options.longest_dead_time_s > 0 || fit.starts == 0) return false;
   if (fit.end == SearchEnd::cancelled) return false;
-  if (!fit.sensor) return follows_input(input);
+  if (!fit.sensor) {
+    const bool is_forced = options.structure && *options.structure != Structure::fractional;
+    const bool has_fitted_clock = options.fits_position_clock && !recording.position_time_s.empty();
+    return may_lack_dead_time(input) && !changes_with_amplitude(amplitude) && !is_forced && !has_fitted_clock;
+  }
   if (fit.sensor->delay_is_at_limit) return true;
   const double age_s = fit.sensor->has_own_clock ? recording.dt_s / 2 : recording.dt_s;  // at most
   const double late_s = fit.sensor->delay_s - age_s - options.sensor_lag_s.value_or(0);
@@ -337,16 +341,20 @@ IdentificationOptions with_dead_time(IdentificationOptions options, const Record
   return options;
 }
 
-bool is_explained_better(const Identification& with_dead_time, const Identification& without) {
-  const Fit &late = with_dead_time.best, &prompt = without.best;
-  if (!(late.model.dead_time_s > 0)) return false;
-  const bool has_sensor = prompt.sensor || std::ranges::any_of(without.runs, [](const JointRun& run) {
-                            return run.fit.sensor.has_value();
-                          });
-  if (!has_sensor) return late.aic < prompt.aic - kClearlyLowerAic;
+bool is_explained_better(const Fit& with_dead_time, const Fit& without, bool by_acceleration) {
+  if (!(with_dead_time.model.dead_time_s > 0)) return false;
+  if (!by_acceleration) return with_dead_time.aic < without.aic - kClearlyLowerAic;
   // The delay of readings that were late has become the plant's: with as many parameters the residuals are as small.
   // How many readings are left out differs, so that no AIC tells.
-  return late.residual_sd < kAsSmall * prompt.residual_sd;
+  return with_dead_time.residual_sd < kAsSmall * without.residual_sd;
+}
+
+std::string dead_time_in_words(const Fit& fit, double dt_s) {
+  std::ostringstream text;
+  text.precision(3);
+  text << "a dead time of " << 1e3 * fit.model.dead_time_s << " ms was found, which nobody named; a column of the duty "
+       << "that is " << fit.model.dead_time_s / dt_s << " rows too early looks the same";
+  return text.str();
 }
 
 std::vector<std::string> second_opinions(OutputErrorSearch& search, const Recording& recording,

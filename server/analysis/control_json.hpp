@@ -32,7 +32,7 @@ Result<control::FractionalModel> model_from(const nlohmann::json& value);
 Result<control::FopdController> controller_from(const nlohmann::json& value);
 // How well an identification knows the parameters of its model, with what it doubts counted: each sigma times the
 // widening of doubts.hpp. None where it does not know one of them, or nobody knows the widening, and for a model that
-// was written by hand. The dead time is taken as known.
+// was written by hand. The sd of the dead time is that of the fit and of its doubt.
 Result<std::optional<control::ExpectedUncertainty>> uncertainty_from(const nlohmann::json& fit);
 
 // The doubts of an identification about its model.

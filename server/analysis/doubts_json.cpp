@@ -118,9 +118,9 @@ std::string doubts_in_words(const ModelDoubts& known) {
   if (words.empty()) return {};
   const auto widening = control::widening(known.doubts);
   if (!widening)
-    words.emplace_back("no ± can be given for what follows");
+    words.emplace_back("no ± can be given for what is computed from it");
   else if (*widening > kNoticeable)
-    words.push_back(fmt::format("each ± that follows is widened {:.2g} times", *widening));
+    words.push_back(fmt::format("each ± of what is computed from it is widened {:.2g} times", *widening));
   return fmt::format("in doubt: {}", fmt::join(words, "; "));
 }
 

@@ -38,7 +38,7 @@ void add_outside_doubts(const RunRecording& recorded, const control::Identificat
             ? "if it is not, that is a dead time of the plant; search for it" + option
             : "the positions come before the duty that moves the robot, as no plant does; correct the clock's offset"));
   }
-  if (options.longest_dead_time_s > 0) {
+  if (options.longest_dead_time_s > 0 || best.model.dead_time_s > 0) {
     warnings.emplace_back("the dead time contains what is left of the error of the outside position's clock");
   }
 }

@@ -53,8 +53,8 @@ Error out_of_time(double time_limit_s) {
   return {
       ErrorCode::conflict,
       fmt::format("the search reached its time limit, {:g} s, so there is no model: raise the limit (rheonaut identify "
-                  "--time-limit-s; time_limit_s of a job, at most 600), or search for one structure or in a "
-                  "shorter part of the run",
+                  "--time-limit-s; time_limit_s of a job, at most 600), or search for one structure, for no dead "
+                  "time (--dead-time-s 0; dead_time_s 0 of a job), or in a shorter part of the run",
                   time_limit_s),
       {}};
 }

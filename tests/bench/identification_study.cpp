@@ -54,6 +54,7 @@ Row study(const control::FractionalModel& fluid, int seeds, int first) {
 
 constexpr unsigned kFamilySeed = 20261129;
 constexpr int kFamilyFluids = 5, kMarginFluids = 4;
+constexpr double kPositionSdM = 0.0005;                                    // of a position from outside
 constexpr double kCrossover_rad_s = 3, kMargin_deg = 90, kMarginMu = 0.8;  // of what is tuned
 
 std::array<double, control::kParameters> values_of(const control::FractionalModel& m) {
@@ -134,7 +135,8 @@ struct MarginRow {
 };
 
 // From record to margin, by what a fit's document says: nobody names a dead time.
-MarginRow margins_of(const control::FractionalModel& fluid, double dead_time_s, int seeds, int first) {
+MarginRow margins_of(const control::FractionalModel& fluid, bool by_position, double dead_time_s, int seeds,
+                     int first) {
   control::IdentificationOptions options = sim_robot::one_start_options();
   options.tries_dead_time = true;
   // Less what the dead time takes: the phase that the controller adds is the same.
@@ -142,8 +144,10 @@ MarginRow margins_of(const control::FractionalModel& fluid, double dead_time_s, 
                                  kMarginMu, false};
   MarginRow row;
   for (int seed = first; seed < first + seeds; ++seed) {
+    const auto number = static_cast<std::uint64_t>(seed);
+    const sim_robot::IdentificationTrial trial{fluid, false, sim_robot::study_duty(), dead_time_s};
     const auto recording =
-        sim_robot::record({fluid, false, sim_robot::study_duty(), dead_time_s}, static_cast<std::uint64_t>(seed));
+        by_position ? sim_robot::record_position(trial, kPositionSdM, number) : sim_robot::record(trial, number);
     const auto document =
         nlohmann::json::parse(server::analysis::json_of(control::identify(recording, options)).dump());
     const auto model = server::analysis::model_from(document);
@@ -170,17 +174,20 @@ MarginRow margins_of(const control::FractionalModel& fluid, double dead_time_s, 
 
 void study_margins(int seeds, int first) {
   std::printf(
-      "| kp, b1, b2, alpha, beta (%d seeds from %d) | dead time | found | tuned | true margin within 2 sd | "
-      "2 sd at most 2 deg | median 2 sd | worst error |\n|---|---|---|---|---|---|---|---|\n",
+      "| kp, b1, b2, alpha, beta (%d seeds from %d) | fitted | dead time | found | tuned | true margin within 2 sd | "
+      "2 sd at most 2 deg | median 2 sd | worst error |\n|---|---|---|---|---|---|---|---|---|\n",
       seeds, first);
   const auto fluids = control::fluid_family(kMarginFluids, kFamilySeed);
-  for (const double dead_time_s : {0.0, 0.02, 0.04, 0.06, 0.08}) {
-    for (const auto& fluid : fluids) {
-      const MarginRow row = margins_of(fluid, dead_time_s, seeds, first);
-      std::printf("| %g, %.4g, %.4g, %.5g, %.4g | %g ms | %d of %d | %d | %d | %d | %.2f deg | %.2f deg |\n", fluid.kp,
-                  fluid.b1, fluid.b2, fluid.alpha, fluid.beta, 1e3 * dead_time_s, row.found, row.fits, row.tuned,
-                  row.covered, row.narrow, row.stated_deg.empty() ? 0 : median_of(row.stated_deg), row.worst_deg);
-      std::fflush(stdout);
+  for (const bool by_position : {false, true}) {
+    for (const double dead_time_s : {0.0, 0.02, 0.04, 0.06, 0.08}) {
+      for (const auto& fluid : fluids) {
+        const MarginRow row = margins_of(fluid, by_position, dead_time_s, seeds, first);
+        std::printf("| %g, %.4g, %.4g, %.5g, %.4g | %s | %g ms | %d of %d | %d | %d | %d | %.2f deg | %.2f deg |\n",
+                    fluid.kp, fluid.b1, fluid.b2, fluid.alpha, fluid.beta, by_position ? "position" : "acceleration",
+                    1e3 * dead_time_s, row.found, row.fits, row.tuned, row.covered, row.narrow,
+                    row.stated_deg.empty() ? 0 : median_of(row.stated_deg), row.worst_deg);
+        std::fflush(stdout);
+      }
     }
   }
 }

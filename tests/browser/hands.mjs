@@ -117,11 +117,11 @@ export async function clear_latch(page) {
 }
 
 // The answer to a script's command, 200. A machine that stood still may have ended the robot's link, or have let the command
-// expire: then it is given again once the robot is there.
+// expire: then it is given again once the robot is there, and has sent what a step counts from.
 export async function commanded(bench, robot_id, body) {
   return until(`${JSON.stringify(body)} is carried out`, async () => {
     const { status, answer } = await bench.post(`/robots/${robot_id}/commands`, body);
-    if (status === 504 || answer.reason === 'not_connected') return false;
+    if (status === 504 || answer.reason === 'not_connected' || / has just connected,/.test(answer.detail)) return false;
     assert.equal(status, 200, JSON.stringify(answer));
     return answer;
   });

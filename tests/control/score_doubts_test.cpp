@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <random>
 #include <vector>
 
 #include "recorded_runs.hpp"
@@ -124,10 +125,37 @@ TEST(InputDoubt, ADeadTimeOfAPositionThatNobodyNamedIsFound) {
   EXPECT_NEAR(late.best.model.dead_time_s, 0.04, 3 * late.best.dead_time_sigma_s.value());
   EXPECT_LT(late.best.dead_time_sigma_s.value(), 0.005);
   EXPECT_FALSE(has_doubt(late, DoubtCode::correlated_with_input));
+  EXPECT_THAT(late.warnings, Contains(HasSubstr(" ms was found, which nobody named; a column of the duty that is ")));
   EXPECT_EQ(identify(late_positions(0), one_fractional_start(true)).best.model.dead_time_s, 0);
   const std::vector<Recording> runs{late_positions(0.04), late_positions(0.04)};
   const Identification together = identify_together(runs, one_fractional_start(true));
   EXPECT_NEAR(together.best.model.dead_time_s, 0.04, 3 * together.best.dead_time_sigma_s.value());
+}
+
+// A model that is late is no explanation of either.
+TEST(InputDoubt, ADriftAndColouredNoiseDoNotFollowTheDuty) {
+  Recording drifting = late_positions(0), coloured = late_positions(0);
+  std::mt19937 random{11};
+  std::normal_distribution<double> fresh{0, 3e-4};
+  double noise_m = 0;
+  for (std::size_t k = 0; k < drifting.position_m.size(); ++k) {
+    drifting.position_m[k] += 2e-3 * kStepS * static_cast<double>(k) / 30;
+    noise_m = 0.9 * noise_m + fresh(random);
+    coloured.position_m[k] += noise_m;
+  }
+  for (const Recording& run : {drifting, coloured}) {
+    const Identification found = identify(run, one_fractional_start(true));
+    EXPECT_FALSE(has_doubt(found, DoubtCode::correlated_with_input)) << found.input->f;
+    EXPECT_EQ(found.best.model.dead_time_s, 0);
+  }
+}
+
+TEST(InputDoubt, AnOrderThatWasForcedIsNoDeadTime) {
+  IdentificationOptions options = one_fractional_start(true);
+  options.structure = Structure::first_order;
+  const Identification forced = identify(late_positions(0), options);
+  EXPECT_EQ(forced.best.model.dead_time_s, 0);
+  EXPECT_TRUE(has_doubt(forced, DoubtCode::correlated_with_input));
 }
 
 TEST(InputDoubt, WhatAmplitudeExplainsIsCountedOnce) {

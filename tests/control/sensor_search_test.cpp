@@ -162,6 +162,8 @@ TEST(SensorSearch, ASensorThatIsUnlikeItsDataSheetIsADoubt) {
   EXPECT_NEAR(*doubt->widening, std::sqrt(1 + (*doubt->value * *doubt->value - 1) / k), 1e-9);
   EXPECT_TRUE(is_grave(*doubt));
   EXPECT_FALSE(std::ranges::any_of(identify(acceleration_run(12, 0.002, 0), one_start()).doubts, is_of_low_pass));
+  const std::vector<Recording> runs{acceleration_run(12, 0.002, 0, 0, 0, 0.005), acceleration_run(6, 0.002, 0)};
+  EXPECT_EQ(std::ranges::count_if(identify_together(runs, one_start()).doubts, is_of_low_pass), 1);
 }
 
 // No search that gives a model ends by the time.

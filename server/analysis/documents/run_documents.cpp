@@ -9,6 +9,7 @@
 #include "server/analysis/control_json.hpp"
 #include "server/analysis/metrics/metrics_json.hpp"
 #include "server/analysis/report/comparison_report.hpp"
+#include "server/analysis/report/run_report.hpp"
 #include "server/storage/query/run_events.hpp"
 
 namespace server::analysis {
@@ -39,6 +40,12 @@ MetricsOfRun with_missed_ticks(storage::Run run, storage::StoredMetrics metrics,
 std::vector<std::string> kinds_of(const Alignment& alignment) {
   if (alignment.at == AlignAt::event) return {alignment.name};
   return {};
+}
+
+// Parses the design: on a worker.
+DesignOfRun line_of(const storage::Design& design) {
+  return {design.id, storage::text(design.made.kind), design.made.name,
+          doubts_about_model(json::parse(design.made.document, nullptr, false))};
 }
 
 }  // namespace
@@ -101,17 +108,11 @@ asio::awaitable<std::vector<storage::AuditEntry>> RunDocuments::audit_of(const s
   co_return std::move(page.entries);
 }
 
-asio::awaitable<std::vector<DesignOfRun>> RunDocuments::designs_of(storage::RunId run) {
+asio::awaitable<std::vector<storage::Design>> RunDocuments::designs_of(storage::RunId run) {
   storage::DesignFilter filter;
   filter.run = run;
   filter.limit = kMostDesigns;
-  std::vector<DesignOfRun> lines;
-  const auto found = co_await parts_.designs.list(filter);
-  for (const storage::Design& design : found) {
-    lines.push_back({design.id, storage::text(design.made.kind), design.made.name,
-                     doubts_about_model(json::parse(design.made.document, nullptr, false))});
-  }
-  co_return lines;
+  co_return co_await parts_.designs.list(filter);
 }
 
 asio::awaitable<std::string> RunDocuments::sha256_of(storage::RunId run) {
@@ -129,12 +130,16 @@ asio::awaitable<Result<std::string>> RunDocuments::report(storage::RunId id, std
   report.trace = std::move(trace->points);
   report.reference = std::move(trace->reference);
   report.metrics = json::parse(found->metrics.document, nullptr, false);
-  report.designs = co_await designs_of(id);
+  add_position_doubts(report.metrics);
+  const auto designs = co_await designs_of(id);
   report.sha256 = co_await sha256_of(id);
   report.audit = co_await audit_of(report.run);
   report.program = base::version();
   report.made_at_us = made_at_us.value_or(parts_.clock.utc_us());
-  auto write = [report = std::move(report)] { return html_of(report); };
+  auto write = [report = std::move(report), designs]() mutable {
+    for (const storage::Design& design : designs) report.designs.push_back(line_of(design));
+    return html_of(report);
+  };
   co_return co_await parts_.analysis.compute(std::move(write));
 }
 

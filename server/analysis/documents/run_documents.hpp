@@ -15,7 +15,6 @@
 #include "server/analysis/analysis_service.hpp"
 #include "server/analysis/comparison/aligned_runs.hpp"
 #include "server/analysis/comparison/impedance_map.hpp"
-#include "server/analysis/report/run_report.hpp"
 #include "server/runtime/clock.hpp"
 #include "server/runtime/result.hpp"
 #include "server/storage/designs/designs.hpp"
@@ -76,7 +75,7 @@ class RunDocuments {
   // 0: the run is measured by its own record.
   boost::asio::awaitable<Result<std::int64_t>> reference_time(storage::RunId run);
   boost::asio::awaitable<Result<AlignedRun>> aligned_run(storage::RunId id, const TracesRequest& request);
-  boost::asio::awaitable<std::vector<DesignOfRun>> designs_of(storage::RunId run);
+  boost::asio::awaitable<std::vector<storage::Design>> designs_of(storage::RunId run);
   boost::asio::awaitable<std::string> sha256_of(storage::RunId run);  // of its certificate; empty: it has none yet
   boost::asio::awaitable<std::vector<storage::AuditEntry>> audit_of(const storage::Run& run);
 

@@ -109,8 +109,9 @@ std::string position_doubt(const json& step) {
   constexpr double kMmPerM = 1e3;
   const double within_mm = 2 * kMmPerM * sd_m.get<double>(), band_mm = kMmPerM * step.at("band_m").get<double>();
   if (within_mm <= band_mm) return {};
-  return fmt::format("± {:.2g} mm is {:.2g} times the band of {:.2g} mm: this shows {}", within_mm, within_mm / band_mm,
-                     band_mm, is_belief ? "the belief only" : "no settling within it");
+  const auto cell = [](double value) { return fmt::format("{:.{}f}", value, value < 10 ? 1 : 0); };
+  return fmt::format("± {} mm is {} times the band of {} mm: this shows {}", cell(within_mm), cell(within_mm / band_mm),
+                     cell(band_mm), is_belief ? "the belief only" : "no settling within it");
 }
 
 }  // namespace

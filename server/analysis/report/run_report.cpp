@@ -218,8 +218,13 @@ std::string steps(const json& metrics) {
                        sd_m.is_number() ? fmt::format("{:.2g}", 2 * sd_m.get<double>()) : "not known",
                        html_escaped(step.at("position_source")));
   }
+  out += "</table>\n";
+  for (const json& step : metrics.at("steps")) {
+    const auto doubt = step.value("position_doubt", std::string{});
+    if (!doubt.empty()) out += fmt::format("<p>At {} s: {}.</p>\n", number_text(step.at("at_s")), html_escaped(doubt));
+  }
   return out +
-         "</table>\n<p class=\"quiet\">A step that was measured by the robot's estimate says what the robot "
+         "<p class=\"quiet\">A step that was measured by the robot's estimate says what the robot "
          "believed, within ± 2 sd.</p>\n";
 }
 

@@ -318,7 +318,7 @@ int run(const Identify& options, std::ostream& out) {
   if (analysis::is_out_of_time(found.best)) {
     throw std::runtime_error{fmt::format(
         "the search reached its time limit, {:g} s, so there is no model: raise --time-limit-s, or search for "
-        "one --structure or in a shorter part of the record",
+        "one --structure, for no dead time (--dead-time-s 0), or in a shorter part of the record",
         options.search.time_limit_s)};
   }
   if (options.form.is_json) {

@@ -92,8 +92,9 @@ TEST(PositionDoubt, IsThatOfAPositionLessExactThanTheBand) {
   };
   EXPECT_EQ(said("known", 0), "");
   EXPECT_EQ(said("estimate", 0.001), "") << "± 2 sd are the band";
-  EXPECT_EQ(said("estimate", 0.03), "± 60 mm is 30 times the band of 2 mm: this shows the belief only");
-  EXPECT_EQ(said("outside", 0.002), "± 4 mm is 2 times the band of 2 mm: this shows no settling within it");
+  EXPECT_EQ(said("estimate", 0.03), "± 60 mm is 30 times the band of 2.0 mm: this shows the belief only");
+  EXPECT_EQ(said("estimate", 0.2), "± 400 mm is 200 times the band of 2.0 mm: this shows the belief only");
+  EXPECT_EQ(said("outside", 0.002), "± 4.0 mm is 2.0 times the band of 2.0 mm: this shows no settling within it");
   EXPECT_EQ(said("estimate", nullptr), "how exact the position is, is not known: this shows the belief only");
 }
 

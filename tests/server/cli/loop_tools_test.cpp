@@ -35,7 +35,8 @@ TEST_F(LoopTools, AMarginIsAsUncertainAsTheDoubtsOfItsModelMakeIt) {
   EXPECT_GT(narrow_deg, 0);
   EXPECT_NEAR(wide_deg, 3 * narrow_deg, 1e-9);
   EXPECT_EQ(sure["plant_doubts_text"], "");
-  EXPECT_THAT(wide["plant_doubts_text"].get<std::string>(), HasSubstr("each ± that follows is widened 3 times"));
+  EXPECT_THAT(wide["plant_doubts_text"].get<std::string>(),
+              HasSubstr("each ± of what is computed from it is widened 3 times"));
   EXPECT_EQ(wide["plant_doubts"][0]["grave"], true);
   const auto late = sigma(R"(, "doubts": [{"code": "dead_time_not_determined", "value": 0.005, "widening": 1}])");
   const double of_dead_time_deg = 5 * 0.005 * 180 / std::numbers::pi;

@@ -223,8 +223,11 @@ test('a run is compared with the controller that the design has sent, not with w
 
 test('a run whose position is less exact than the band is not said to have verified anything', () => {
   const design = { ...kNothing, verified: 12 };
-  expect(verify_state(design, 'sim-1', '', [{ position_doubt: '' }, {}]).text).toBe('run 12');
-  expect(verify_state(design, 'sim-1', '', [{}, { position_doubt: '± 60 mm is 30 times the band' }]).text).toBe(
+  const position_doubt = '± 60 mm is 30 times the band';
+  const said = (...steps: Parameters<typeof verify_state>[3]) => verify_state(design, 'sim-1', '', steps).text;
+  expect(said({ position_source: 'estimate', position_doubt: '' }, { position_source: 'known' })).toBe('run 12');
+  expect(said({ position_source: 'outside', position_doubt })).toBe('run 12'); // which says where, less exactly
+  expect(said({ position_source: 'known' }, { position_source: 'estimate', position_doubt })).toBe(
     'run 12, which does not tell where the robot was',
   );
 });

@@ -122,11 +122,11 @@ export function verify_state(
   design: StepProps['design'],
   robot_id: string,
   problem: string,
-  steps: Pick<StepMeasures, 'position_doubt'>[],
+  steps: Pick<StepMeasures, 'position_doubt' | 'position_source'>[],
 ): StepState {
   if (problem !== '') return { kind: 'failed', text: `failed: ${problem}` };
   // A loop on the robot's estimate settles in its belief, whether or not the robot does.
-  const is_belief = steps.some(({ position_doubt }) => position_doubt);
+  const is_belief = steps.some((step) => step.position_doubt && step.position_source === 'estimate');
   if (design.verified !== null)
     return {
       kind: 'done',
