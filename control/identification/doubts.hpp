@@ -54,7 +54,7 @@ std::optional<double> widening(std::span<const Doubt> doubts);  // (5); none: no
 std::vector<Doubt> doubts_about(const Fit& fit, const std::optional<ScoreEvidence>& amplitude,
                                 const std::optional<ScoreEvidence>& input, double share_used);
 
-// Of a sensor that is far from its data sheet: doubts_about() of one recording has them.
+// Doubts about a sensor that is far from its data sheet; doubts_about() of one recording has them.
 std::vector<Doubt> sensor_doubts(const Fit& fit);
 
 double dead_time_sd_s(std::span<const Doubt> doubts);  // 0: none is in doubt

@@ -164,7 +164,7 @@ struct Explained {
   double colour = 1;  // values per independent one, of what is left
 };
 
-// What `further` explains of what `known` leaves.
+// The part of the residuals that `further` explains of what `known` leaves.
 std::optional<Explained> explained_by(const Residuals& residuals, const MatrixXd& known, const MatrixXd& further) {
   if (!known.allFinite() || !further.allFinite()) return std::nullopt;
   const Qr by_known = directions(known, 1e-9);

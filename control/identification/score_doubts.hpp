@@ -44,7 +44,7 @@ bool may_lack_dead_time(const std::optional<ScoreEvidence>& input);  // F above 
 std::vector<std::string> amplitude_doubts(const std::optional<ScoreEvidence>& evidence, const Recording& recording,
                                           bool order_is_forced, const std::string& structure_option = {});
 
-// Of evidence that amplitude does not explain.
+// Sentences about evidence that amplitude does not explain.
 std::vector<std::string> input_doubts(const std::optional<ScoreEvidence>& evidence,
                                       const std::optional<ScoreEvidence>& amplitude,
                                       const IdentificationOptions& options);

@@ -1,4 +1,4 @@
-// What of a run's residuals is put down to amplitude: a drag behind a dead time is, an order that was forced is not.
+// Residuals that are put down to amplitude: a drag behind a dead time is, an order that was forced is not.
 // And what to another linear model, as a dead time is, which is then looked for.
 #include "control/identification/score_doubts.hpp"
 
@@ -37,7 +37,7 @@ Recording dragged_run(double dead_time_s) {
   return run;
 }
 
-// Of the true fluid, as if it had been found.
+// Evidence about the true fluid, as if it had been found.
 ScoreEvidence evidence_of(const Recording& run, double dead_time_s) {
   IdentificationOptions options = unhurried_options();
   options.longest_dead_time_s = 1;

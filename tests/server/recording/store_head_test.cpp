@@ -113,7 +113,7 @@ TEST_F(StoreHeadTest, TheFirstSamplesAreInTheFileWithTheirCommit) {
 TEST_F(StoreHeadTest, WhatIsOlderThanSecondsIsInTheFile) {
   record(4000);
   const std::int64_t in_file = number_without_log("SELECT count(*) FROM sample");
-  EXPECT_GE(in_file, 4000 - 2 * 1000 - 300);  // what a pass leaves, where another holds the log, waits for the next one
+  EXPECT_GE(in_file, 4000 - 2 * 1000 - 300);  // what a pass leaves waits for the next one
   clock_.run_for(11s);                        // nothing comes any more
   EXPECT_EQ(number_without_log("SELECT count(*) FROM sample"), 4000);
   EXPECT_LE(recorder_->wal().checkpoints, 10U);

@@ -203,7 +203,7 @@ export function discretised_of(document: unknown): Discretised | null {
   return found?.sections ? found : null;
 }
 
-// What is in doubt about the model that a kept controller was tuned for, in a line; empty: nothing, or nobody has said.
+// Doubts about the model that a kept controller was tuned for, in a line; empty: none, or nobody has said.
 export function plant_doubts_of(document: unknown): string {
   const text = (document as { plant_doubts_text?: unknown } | null)?.plant_doubts_text;
   return typeof text === 'string' ? text : '';
