@@ -85,7 +85,9 @@ const CommandRecord* Station::known_command(const RobotId& robot_id, CommandId i
   return recent == nullptr ? nullptr : &recent->record;
 }
 
-void Station::set_on_fluid_named(OnFluidNamed on_fluid_named) { parts_->on_fluid_named = std::move(on_fluid_named); }
+void Station::set_on_model_wanted(OnModelWanted on_model_wanted) {
+  parts_->on_model_wanted = std::move(on_model_wanted);
+}
 
 // SAFETY: a fluid brings its limits. While somebody is in control nobody else changes the limits that they command
 // under.
@@ -100,7 +102,7 @@ Result<void> Station::set_fluid(const RobotId& id, const std::string& text, cons
   RobotState& robot = entry->robot;
   if (robot.fluid == fluid) {
     // SAFETY: who may not command the robot sends it no model either.
-    if (parts_->control.may_use(id, by.actor)) parts_->on_fluid_named(robot, by);
+    if (parts_->control.may_use(id, by.actor)) parts_->on_model_wanted(robot, by, {});
     return {};
   }
   if (auto permitted = parts_->control.may_use(id, by.actor); !permitted) {
@@ -120,7 +122,43 @@ Result<void> Station::set_fluid(const RobotId& id, const std::string& text, cons
   parts_->notifier.publish(AuditNote{by, id, "robot.fluid_set", fluid, fluid_detail(before)});
   parts_->notifier.note(robot, "fluid_set", fmt::format("{} by {}", fluid.empty() ? "not known" : fluid, by.actor));
   parts_->notifier.publish(robot);
-  parts_->on_fluid_named(robot, by);
+  parts_->on_model_wanted(robot, by, {});
+  return {};
+}
+
+// SAFETY: a model changes the estimate that the robot steers by, so who may not command it sends it none; and one that
+// was found in another fluid is not sent.
+Result<void> Station::may_send_model(const RobotId& id, const std::string& text, const Author& by) {
+  const RobotEntry* entry = parts_->robots.find(id);
+  if (entry == nullptr) {
+    return fail(ErrorCode::not_found, fmt::format("no robot '{}' is known", id), "unknown_robot");
+  }
+  if (auto permitted = parts_->control.may_use(id, by.actor); !permitted) {
+    permitted.error().detail += "; only who is in control sends it a model";
+    note_refusal(by, id, "model", refused_model(text), permitted.error());
+    return permitted;
+  }
+  const auto fluid = parts_->envelope.listed(text);
+  if (!fluid) return std::unexpected{fluid.error()};
+  const std::string& named = entry->robot.fluid;
+  if (named != *fluid) {
+    return fail(
+        ErrorCode::conflict,
+        fmt::format("the model is of '{}', and robot '{}' is in {}; name its fluid first if it is in '{}'", *fluid, id,
+                    named.empty() ? "a fluid that nobody has named" : fmt::format("'{}'", named), *fluid),
+        "other_fluid");
+  }
+  if (entry->robot.link != LinkState::connected) {
+    return fail(ErrorCode::not_connected, "the robot is not connected; send the model when it is", "not_connected");
+  }
+  return {};
+}
+
+Result<void> Station::send_model(const RobotId& id, const std::string& fluid, FluidModel model, const Author& by) {
+  if (auto may = may_send_model(id, fluid, by); !may) return may;
+  model.set_by = by.actor;
+  model.set_at_us = by.at_us;
+  parts_->on_model_wanted(parts_->robots.find(id)->robot, by, std::move(model));
   return {};
 }
 

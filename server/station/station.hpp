@@ -28,6 +28,7 @@
 #include "server/station/state/audit_note.hpp"
 #include "server/station/state/checked.hpp"
 #include "server/station/state/clock_sync.hpp"
+#include "server/station/state/fluid_model.hpp"
 #include "server/station/state/in_force.hpp"
 #include "server/station/state/robot_archive.hpp"
 #include "server/station/state/robot_link.hpp"
@@ -155,9 +156,16 @@ class Station {
   // in control.
   Result<void> set_fluid(const RobotId& id, const std::string& fluid, const Author& by);
 
-  // Called at the end of each set_fluid() of somebody who may command the robot, also when it names the same fluid.
-  using OnFluidNamed = std::function<void(const RobotState&, const Author&)>;
-  void set_on_fluid_named(OnFluidNamed on_fluid_named);
+  // Sends the robot this model of the fluid that is named for it, which no other robot gets. not_found; not_connected;
+  // conflict where another fluid or none is named, and while somebody else is in control. The caller writes the audit
+  // before, since a reason for a model in doubt must stand there: so it can ask whether it may.
+  Result<void> may_send_model(const RobotId& id, const std::string& fluid, const Author& by);
+  Result<void> send_model(const RobotId& id, const std::string& fluid, FluidModel model, const Author& by);
+
+  // Called at the end of each set_fluid() of somebody who may command the robot, also when it names the same fluid, and
+  // of each send_model() with its model.
+  using OnModelWanted = std::function<void(const RobotState&, const Author&, std::optional<FluidModel> own)>;
+  void set_on_model_wanted(OnModelWanted on_model_wanted);
 
   // What has become of the model of the robot's fluid, and an event of that.
   void set_model(const RobotId& id, RobotModel model);

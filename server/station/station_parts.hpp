@@ -6,6 +6,7 @@
 #include <boost/asio/io_context.hpp>
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <set>
 #include <string>
 #include <utility>
@@ -18,6 +19,7 @@
 #include "server/station/emergency_stops.hpp"
 #include "server/station/robot_table.hpp"
 #include "server/station/sink_notifier.hpp"
+#include "server/station/state/fluid_model.hpp"
 #include "server/station/timed_commands.hpp"
 
 namespace server::station {
@@ -80,7 +82,8 @@ struct StationParts {
   std::uint64_t events_left_out = 0;
   runtime::TimeHistogram round_trips;
   SampleBatch batch;  // of the frame that is being received; kept for its memory
-  std::function<void(const RobotState&, const Author&)> on_fluid_named = [](const RobotState&, const Author&) {};
+  std::function<void(const RobotState&, const Author&, std::optional<FluidModel> own)> on_model_wanted =
+      [](const RobotState&, const Author&, const std::optional<FluidModel>&) {};
 
  private:
   void leave_out(RobotEntry& entry, std::uint64_t event_seq);

@@ -121,6 +121,8 @@ const steps = {
   },
 
   async 'a model is identified from a run, with its progress, and validated on what was not fitted'() {
+    const { status } = await bench.post(`/robots/${kRobot}/fluid`, { fluid: 'non_newtonian' });
+    assert.equal(status, 200);
     const { run_id } = await recorded('Excited', 'duty_max = 0.6', '[[step]]\nkind = "rest"\nfor_s = 1\n\n[[step]]\nkind = "prbs"\namplitude = 0.6\nbit_s = 0.2\nfor_s = 10\n');
     fitted_run = run_id;
     await page.goto(`${bench.http}/#/runs/${run_id}`);
@@ -130,9 +132,9 @@ const steps = {
     await page.fill('#design-to', '8');
     await page.press('#design-to', 'Enter');
     await says('to=8');
-    await page.fill('#design-limit', '6');
+    await page.fill('#design-limit', '290');
     await page.press('#design-limit', 'Enter');
-    await says('limit=6');
+    await says('limit=290');
     await choose('design-validation', `the rest of run ${run_id}`);
     await says(`validation=${run_id}`);
     const states = await watch_attribute(page, '#design-part-identify', 'data-state');
@@ -180,6 +182,18 @@ const steps = {
     assert.equal((await in_force()).checksum, before.checksum);
     await page.locator('#design-push:enabled').click();
     await is_in_state('push', 'done');
+  },
+
+  async 'the model goes to the robot, too, which holds it, assumes it, or cannot take it'() {
+    const { estimator } = (await bench.ask('/designs/1')).document;
+    if (estimator.refused) {
+      await shows(page, '#design-model-note', /cannot take softener: /);
+      return assert.ok(await page.locator('#design-send-model').isDisabled());
+    }
+    await page.locator('#design-send-model:enabled').click();
+    await shows(page, '#design-model-note', /sim-1 (holds|assumes) the model of non-Newtonian \(fit error [\d.]+ %\)/);
+    const { model } = await bench.ask(`/robots/${kRobot}`);
+    assert.equal(model.fit_error, estimator.fit_error);
   },
 
   async 'what the robot did stands beside what was predicted, and as its belief'() {

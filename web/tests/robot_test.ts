@@ -59,6 +59,12 @@ test('beside the fluid stands what became of its model, and nothing where there 
   expect(model_notice(model_state('confirmed', 'water'), 'water', true)).toBe(
     'The model of water is in force, fit error 0.21 %.',
   );
+  expect(model_notice(model_state('confirmed', 'water', 'sent to this robot alone'), 'water', false)).toBe(
+    'The model of water is in force, fit error 0.21 %: sent to this robot alone.',
+  );
+  expect(model_notice({ ...model_state('assumed', 'water', 'in doubt') }, 'water', false)).toBe(
+    'The model of water is not in force: in doubt.',
+  );
   expect(model_notice(model_state('sending'), null, false)).toBe(
     'The confirmation of the model before is being taken back.',
   );

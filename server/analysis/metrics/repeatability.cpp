@@ -7,7 +7,6 @@
 namespace server::analysis {
 namespace {
 
-constexpr double kRepeatabilityFactor = 2.8;
 constexpr double kTwoSided95 = 0.975;
 
 }  // namespace
@@ -29,9 +28,9 @@ Repeatability repeatability_of(std::span<const std::optional<double>> values) {
     if (value) squares += (*value - *result.mean) * (*value - *result.mean);
   }
   result.sd = std::sqrt(squares / (n - 1));
-  const boost::math::students_t distribution{n - 1};
-  result.confidence_half_width = boost::math::quantile(distribution, kTwoSided95) * *result.sd / std::sqrt(n);
-  result.repeatability_limit = kRepeatabilityFactor * *result.sd;
+  const double t = boost::math::quantile(boost::math::students_t{n - 1}, kTwoSided95);
+  result.confidence_half_width = t * *result.sd / std::sqrt(n);
+  result.repeatability_limit = t * std::sqrt(2.0) * *result.sd;
   return result;
 }
 

@@ -1,7 +1,8 @@
 // Statistics of one figure over repeated runs.
 //
-//   repeatability limit = 2.8 s_r: of two runs in the same conditions 95 % differ by less            ISO 5725-6, 4.1.4
+//   repeatability limit = t(0.975; n - 1) √2 s_r: of two further runs in the same conditions 95 % differ by less
 //   confidence: mean ± t(0.975; n - 1) s_r/√n                                                          Student's t
+// ISO 5725-6, 4.1.4 has 2.8 s_r, which is the limit for very many runs: with two it would hold in 70 % of cases.
 // Pure.
 #pragma once
 

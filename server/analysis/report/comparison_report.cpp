@@ -211,8 +211,9 @@ std::string steps_section(const ComparisonReport& report) {
   }
   if (number == 0) return out;
   return out +
-         "<p class=\"quiet\">sd: the repeatability standard deviation (ISO 5725). limit: 2.8 sd; of two repeats 95 % "
-         "differ by less. ± 95 %: the confidence of the mean. Steps that were measured by the robot's estimate say how "
+         "<p class=\"quiet\">sd: the repeatability standard deviation (ISO 5725). limit: of two further runs 95 % "
+         "differ by less, by Student's t for so few. ± 95 %: the confidence of the mean. Steps that were measured by "
+         "the robot's estimate say how "
          "repeatable the estimate is.</p>\n";
 }
 

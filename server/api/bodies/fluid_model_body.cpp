@@ -117,6 +117,17 @@ Result<station::FluidModel> parse_fluid_model(const std::string& text) {
   return model;
 }
 
+Result<OwnModelBody> parse_own_model(const std::string& text) {
+  const auto body = Members::parse(text, {"fluid", "model"});
+  if (!body) return std::unexpected{body.error()};
+  const auto fluid = body->text("fluid", text_bytes("OwnModelBody.fluid"));
+  if (!fluid) return std::unexpected{fluid.error()};
+  if (!body->has("model")) return fail(ErrorCode::bad_request, "model is missing", "missing_member");
+  auto model = parse_fluid_model(base::dump(body->object().at("model")));
+  if (!model) return std::unexpected{model.error()};
+  return OwnModelBody{*fluid, std::move(*model)};
+}
+
 json to_json(const station::FluidModel& model) {
   json out = json::parse(model.document, nullptr, false);
   if (!out.is_object()) out = json::object();

@@ -16,6 +16,7 @@
 #include "server/analysis/identify_job.hpp"
 #include "server/analysis/reference_import.hpp"
 #include "server/analysis/tuning/tune_job.hpp"
+#include "server/analysis/tuning/tuning_ranges.hpp"
 #include "server/api/bodies/json.hpp"
 #include "server/identity/accounts.hpp"
 #include "server/runtime/secrets.hpp"
@@ -42,6 +43,10 @@ inline constexpr std::size_t kMaxLongWordBytes = 4000;
 
 inline constexpr std::size_t kMaxDocumentBytes = 16'384;  // of a fluid's model: its texts and plant together
 
+inline constexpr Range<double> kCrossovers_rad_s{analysis::kLowestCrossover_rad_s, analysis::kHighestCrossover_rad_s};
+inline constexpr Range<double> kMargins_deg{analysis::kSmallestMargin_deg, analysis::kLargestMargin_deg};
+inline constexpr Range<double> kMus{analysis::kLowestMu, analysis::kHighestMu};
+
 inline constexpr Limit<std::size_t> kTextLimits[] = {
     // bytes: minLength, maxLength
     {"ControlBody.reason", kNameBytes},
@@ -59,6 +64,7 @@ inline constexpr Limit<std::size_t> kTextLimits[] = {
     {"LoginBody.password", {0, 10 * runtime::kMaxPasswordBytes}},
     {"LoginBody.user", {0, kMaxWordBytes}},
     {"MarkerBody.text", kReasonBytes},
+    {"OwnModelBody.fluid", kNameBytes},
     {"ReferenceBody.csv", {1, analysis::kMaxReferenceBytes}},
     {"ReferenceBody.reason", kReasonBytes},
     {"ReferenceBody.source", kNameBytes},
@@ -176,20 +182,20 @@ inline constexpr Limit<double> kNumberLimits[] = {
     {"ReferenceClock.sd_s", kReferenceClockSd_s},
     {"ReferenceClock.to_s", kReferenceSeconds},
     {"ReservationBody.for_s", {1, kLongestReservation_s}},
-    {"TuneJobBody.crossover_rad_s", {1e-3, 1e4}},
+    {"TuneJobBody.crossover_rad_s", kCrossovers_rad_s},
     {"TuneJobBody.duty_max", {0.01, 1}},
     {"TuneJobBody.duty_min", {-1, 0}},
-    {"TuneJobBody.mu", {0.01, 1.99}},
-    {"TuneJobBody.period_s", {0.001, 1}},
-    {"TuneJobBody.phase_margin_deg", {0.1, 179.9}},
-    {"TuneMeasuredJobBody.crossover_rad_s", {1e-3, 1e4}},
+    {"TuneJobBody.mu", kMus},
+    {"TuneJobBody.period_s", {0.001, analysis::kLongestPeriod_s}},
+    {"TuneJobBody.phase_margin_deg", kMargins_deg},
+    {"TuneMeasuredJobBody.crossover_rad_s", kCrossovers_rad_s},
     {"TuneMeasuredJobBody.duty_max", {0.01, 1}},
     {"TuneMeasuredJobBody.duty_min", {-1, 0}},
-    {"TuneMeasuredJobBody.mu", {0.01, 1.99}},
-    {"TuneMeasuredJobBody.period_s", {0.001, 1}},
-    {"TuneMeasuredJobBody.phase_margin_deg", {0.1, 179.9}},
-    {"TuningMapJobBody.from_rad_s", {1e-3, 1e4}},
-    {"TuningMapJobBody.to_rad_s", {1e-3, 1e4}},
+    {"TuneMeasuredJobBody.mu", kMus},
+    {"TuneMeasuredJobBody.period_s", {0.001, analysis::kLongestPeriod_s}},
+    {"TuneMeasuredJobBody.phase_margin_deg", kMargins_deg},
+    {"TuningMapJobBody.from_rad_s", kCrossovers_rad_s},
+    {"TuningMapJobBody.to_rad_s", kCrossovers_rad_s},
 };
 
 // SAFETY: the robot refuses what is outside; the station passes it on, since what it knows of a robot may be old.

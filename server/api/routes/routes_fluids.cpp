@@ -1,10 +1,11 @@
-// The fluids that robots may be in, with their limits and models, and which one a robot is in.
+// The fluids that robots may be in, with their limits and models, which one a robot is in, and a model of its own.
 #include <algorithm>
 
 #include "server/api/bodies/fluid_model_body.hpp"
 #include "server/api/bodies/limits.hpp"
 #include "server/api/routes/routes.hpp"
 #include "server/config/station_document.hpp"
+#include "server/identity/auth.hpp"
 #include "server/station/station.hpp"
 #include "server/storage/ingest/recorder.hpp"
 #include "server/storage/runs/fluid_models.hpp"
@@ -48,7 +49,7 @@ Result<std::string> parse_fluid(const std::string& text, const config::Envelope&
   return envelope.listed(*fluid);
 }
 
-// What has become of the fluid's model on the robot, when that is known in time.
+// What has become of the model on the robot, when that is known in time.
 boost::asio::awaitable<json> model_sent(FluidRoutes parts, std::string id) {
   const std::int64_t deadline_us = parts.clock.steady_us() + kSendingPatience.count();
   while (parts.station.find(id)->model.state == station::ModelState::sending && parts.clock.steady_us() < deadline_us) {
@@ -74,6 +75,23 @@ http::Answer set_fluid(FluidRoutes parts, http::Request request) {
   co_return http::json_response(200, {{"fluid", fluid->empty() ? json(nullptr) : json(*fluid)},
                                       {"limits", limits_json(envelope.in(*fluid))},
                                       {"model", std::move(model)}});
+}
+
+// Nothing of it is kept: it ends with the robot's boot. SAFETY: why a model in grave doubt is confirmed stands in the
+// audit before it is sent; who has lost the right meanwhile sends nothing.
+http::Answer send_model(FluidRoutes parts, http::Request request) {
+  const std::string& id = request.param.at("robot_id");
+  auto body = parse_own_model(request.body);
+  if (!body) co_return http::problem(body.error());
+  const station::Author by = author_of(request, parts.clock);
+  if (const auto may = parts.station.may_send_model(id, body->fluid, by); !may) co_return http::problem(may.error());
+  const auto noted = co_await parts.fluid_models.note_sent(id, parts.station.find(id)->fluid, body->model, by);
+  if (!noted) co_return http::problem(noted.error());
+  if (auto stands = still_stands(request.caller); !stands) co_return http::problem(stands.error());
+  const auto sent = parts.station.send_model(id, body->fluid, std::move(body->model), by);
+  if (!sent) co_return http::problem(sent.error());
+  json now = co_await model_sent(parts, id);
+  co_return http::json_response(200, {{"model", std::move(now)}});
 }
 
 // The robots that are in this fluid: nothing is sent to them by itself.
@@ -116,6 +134,7 @@ void add_fluid_routes(http::Router& router, FluidRoutes parts) {
   add("POST", "/api/v1/fluids/{fluid}/model", identity::Scope::command, set_model);
   add("POST", "/api/v1/fluids/{fluid}/model/remove", identity::Scope::command, remove_model);
   add("POST", "/api/v1/robots/{robot_id}/fluid", identity::Scope::command, set_fluid);
+  add("POST", "/api/v1/robots/{robot_id}/model", identity::Scope::command, send_model);
 }
 
 }  // namespace server::api

@@ -35,26 +35,6 @@ json ask(const FluidCommand& options, const std::string& method, const std::stri
   throw std::runtime_error{fmt::format("the station refused: {}", answer.body.value("detail", "no reason"))};
 }
 
-// A name of the list may have any character.
-std::string path_of_model(const std::string& fluid) {
-  std::string encoded;
-  for (const char c : fluid) encoded += fmt::format("%{:02X}", static_cast<unsigned char>(c));
-  return "/api/v1/fluids/" + encoded + "/model";
-}
-
-json read_model(const std::filesystem::path& file) {
-  json model = read_json(file.string());
-  if (model.is_object()) return model;
-  throw std::runtime_error{
-      fmt::format("'{}' is not a JSON object, as `rheonaut estimator --json` writes it", file.string())};
-}
-
-json model_in(const FluidCommand& options) {
-  json model = read_model(options.file);
-  if (!options.confirm_because.empty()) model["confirmed_because"] = options.confirm_because;
-  return model;
-}
-
 int list(const FluidCommand& options, std::ostream& out) {
   const json fluids = ask(options, "GET", "/api/v1/fluids").at("fluids");
   if (options.json) fmt::print(out, "{}\n", fluids.dump(2));
@@ -72,9 +52,9 @@ int list(const FluidCommand& options, std::ostream& out) {
 
 int change(const FluidCommand& options, std::ostream& out) {
   const bool removes = options.act == FluidCommand::Act::remove_model;
-  const std::string path = path_of_model(options.fluid);
-  const json answer =
-      removes ? ask(options, "POST", path + "/remove", json::object()) : ask(options, "POST", path, model_in(options));
+  const std::string path = path_of_fluid_model(options.fluid);
+  const json answer = removes ? ask(options, "POST", path + "/remove", json::object())
+                              : ask(options, "POST", path, model_in_file(options.file, options.confirm_because));
   if (options.json) {
     fmt::print(out, "{}\n", answer.dump(2));
     return 0;
@@ -96,6 +76,27 @@ int change(const FluidCommand& options, std::ostream& out) {
 }
 
 }  // namespace
+
+json model_in_file(const std::filesystem::path& file, const std::string& confirm_because) {
+  json model = read_json(file.string());
+  if (!model.is_object()) {
+    throw std::runtime_error{
+        fmt::format("'{}' is not a JSON object, as `rheonaut estimator --json` writes it", file.string())};
+  }
+  if (!confirm_because.empty()) model["confirmed_because"] = confirm_because;
+  return model;
+}
+
+bool model_has_arrived(const json& model) {
+  const json& state = model.at("state");
+  return (state == "confirmed" || state == "assumed") && model.at("fit_error").is_number();
+}
+
+std::string path_of_fluid_model(const std::string& fluid) {
+  std::string encoded;
+  for (const char c : fluid) encoded += fmt::format("%{:02X}", static_cast<unsigned char>(c));
+  return "/api/v1/fluids/" + encoded + "/model";
+}
 
 void add_options(CLI::App& command, FluidCommand& options) {
   command.require_subcommand(1);

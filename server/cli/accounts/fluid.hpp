@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <iosfwd>
+#include <nlohmann/json.hpp>
 #include <string>
 
 namespace CLI {
@@ -23,6 +24,15 @@ struct FluidCommand {
 };
 
 void add_options(CLI::App& command, FluidCommand& options);
+
+// A model as the API takes it, from a file ("-": standard input). Throws
+// std::runtime_error for what is no JSON object.
+nlohmann::json model_in_file(const std::filesystem::path& file, const std::string& confirm_because);
+// Whether the robot holds the model that was sent, confirmed or assumed, by the member `model` of its document. An
+// assumed model has a fit error only if the station has sent it.
+bool model_has_arrived(const nlohmann::json& model);
+// Of the API; a name of the list may have any character.
+std::string path_of_fluid_model(const std::string& fluid);
 
 // Asks the station that runs in the folder. Throws std::runtime_error saying why nothing was changed.
 int run(const FluidCommand& options, std::ostream& out);

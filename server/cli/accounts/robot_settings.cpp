@@ -10,6 +10,7 @@
 #include <stdexcept>
 
 #include "server/analysis/control_json.hpp"
+#include "server/cli/accounts/fluid.hpp"
 #include "server/cli/accounts/station_client.hpp"
 #include "server/cli/design/discretise.hpp"
 #include "server/cli/terminal/exit_status.hpp"
@@ -191,8 +192,8 @@ std::string model_words(const json& model) {
   const auto reason = model.at("reason").get<std::string>();
   const auto state = model.at("state").get<std::string>();
   const json& error = model.at("fit_error");
-  if (!error.is_null()) return fmt::format("{}, fit error {:.2g} %", state, 100 * error.get<double>());
-  return reason.empty() ? state : fmt::format("{}: {}", state, reason);
+  const std::string fit = error.is_null() ? "" : fmt::format(", fit error {:.2g} %", 100 * error.get<double>());
+  return state + fit + (reason.empty() ? "" : ": " + reason);
 }
 
 // Reads the robot's document, or the station's answer to a change: both have the two members.
@@ -214,6 +215,16 @@ int set_fluid(const Robot& robot, const RobotSettingsCommand& options, std::ostr
   return print_fluid(robot.post("/fluid", {{"fluid", fluid}}), options.json, out);
 }
 
+// Who sends a model names its fluid: the one that the robot is in may be another.
+int send_model(const Robot& robot, const RobotSettingsCommand& options, std::ostream& out) {
+  const json sent = model_in_file(options.model, options.confirm_because);
+  const json fluid = robot.post("/fluid", {{"fluid", options.set}}).at("fluid");
+  const json body{{"fluid", fluid}, {"model", sent}};
+  const json model = robot.post("/model", body).at("model");
+  print_fluid({{"fluid", fluid}, {"model", model}}, options.json, out);
+  return model_has_arrived(model) ? 0 : not_done(kNotVerified, "the model: " + model_words(model));
+}
+
 CLI::App* offer(CLI::App& robot, RobotSettingsCommand& options, Of of, const char* name, const char* purpose) {
   CLI::App* sub = robot.add_subcommand(name, purpose);
   sub->add_option("robot_id", options.robot_id, "The robot")->required();
@@ -233,6 +244,17 @@ void offer_fluid(CLI::App& robot, RobotSettingsCommand& options) {
       fluid->add_option("--set", options.set, "It is in this one, as `rheonaut fluid list` names it")->check(named());
   fluid->add_flag("--not-known", options.is_not_known, "Nobody knows its fluid: the strictest limits of all hold")
       ->excludes(set);
+  CLI::Option* model = fluid
+                           ->add_option("--model", options.model,
+                                        "With --set: send it this model of that fluid, from `rheonaut estimator "
+                                        "--json` (-: standard input); no other robot gets it")
+                           ->check(named())
+                           ->needs(set);
+  fluid
+      ->add_option("--confirm-because", options.confirm_because,
+                   "Why it may take a model that is in grave doubt for that of its fluid; it stands in the audit")
+      ->check(named())
+      ->needs(model);
   fluid->footer("Example: rheonaut robot fluid sim-1 --set water --data lab");
 }
 
@@ -274,6 +296,7 @@ int run(const RobotSettingsCommand& options, std::ostream& out) {
     return options.read_anew ? read_parameters(robot, options, out) : list_parameters(robot, options.json, out);
   }
   if (options.of == Of::fluid) {
+    if (!options.model.empty()) return send_model(robot, options, out);
     const bool is_change = options.is_not_known || !options.set.empty();
     return is_change ? set_fluid(robot, options, out) : print_fluid(robot.get(""), options.json, out);
   }

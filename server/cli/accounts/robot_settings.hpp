@@ -23,7 +23,9 @@ struct RobotSettingsCommand {
   std::optional<std::int64_t> design;  // a controller that the station keeps, to be set
   bool read_anew = false;
   bool restore = false;
-  bool is_not_known = false;  // the fluid
+  bool is_not_known = false;    // the fluid
+  std::string model;            // of its fluid, to be sent: a file, or "-" for standard input; empty: none
+  std::string confirm_because;  // of that model in spite of a grave doubt; empty: it is not confirmed then
   bool confirm = false;
   std::optional<double> duty_min, duty_max;
   std::string derivative_on;  // empty: as in the controller in force

@@ -80,9 +80,13 @@ bool BusyWait::is_busy(const StationAnswer& answer) {
 
 bool BusyWait::asks_again(const StationAnswer& answer) {
   if (!is_busy(answer)) return false;
+  pause();
+  return true;
+}
+
+void BusyWait::pause() {
   loop_.restart();
   runtime::run_first(loop_, clock_.sleep_for(rule_.pause));
-  return true;
 }
 
 nlohmann::json asked(StationAnswer answer) {

@@ -33,6 +33,7 @@ class BusyWait {
   bool is_busy(const StationAnswer& answer);
   // The same; true after the pause.
   bool asks_again(const StationAnswer& answer);
+  void pause();
 
  private:
   BusyRule rule_;

@@ -9,6 +9,7 @@
 #include "control/tuning/tuning_alternatives.hpp"
 #include "server/analysis/tuning/margin_sigmas.hpp"
 #include "server/analysis/tuning/tuning_json.hpp"
+#include "server/analysis/tuning/tuning_ranges.hpp"
 #include "server/cli/design/discretise.hpp"
 #include "server/cli/design/robustness_table.hpp"
 #include "server/cli/terminal/options.hpp"
@@ -153,9 +154,9 @@ CLI::Option* add_map_options(CLI::App& command, Tune& options) {
   auto* map = command.add_flag("--map", options.is_map,
                                "Instead of a controller, which phase margins have one, crossover by crossover");
   command.add_option("--from-rad-s", options.map.from_rad_s, "Of the map (default: 0.5)")
-      ->check(positive())
+      ->check(crossovers())
       ->needs(map);
-  command.add_option("--to-rad-s", options.map.to_rad_s, "Of the map (default: 50)")->check(positive())->needs(map);
+  command.add_option("--to-rad-s", options.map.to_rad_s, "Of the map (default: 50)")->check(crossovers())->needs(map);
   command.add_option("--points", options.map.points, "Of the map, spaced logarithmically (default: 60)")
       ->check(whole(2, control::kMostMapPoints))
       ->needs(map);
@@ -164,20 +165,26 @@ CLI::Option* add_map_options(CLI::App& command, Tune& options) {
 
 }  // namespace
 
+CLI::Validator crossovers() { return from_to(analysis::kLowestCrossover_rad_s, analysis::kHighestCrossover_rad_s); }
+
+CLI::Validator margins() { return from_to(analysis::kSmallestMargin_deg, analysis::kLargestMargin_deg); }
+
+CLI::Validator mus() { return from_to(analysis::kLowestMu, analysis::kHighestMu); }
+
 void add_options(CLI::App& command, Tune& options) {
   add_option(command, options.plant);
   auto* crossover =
-      command.add_option("--crossover-rad-s", options.spec.gain_crossover_rad_s, "Gain crossover")->check(positive());
+      command.add_option("--crossover-rad-s", options.spec.gain_crossover_rad_s, "Gain crossover")->check(crossovers());
   auto* margin =
-      command.add_option("--phase-margin-deg", options.spec.phase_margin_deg, "Phase margin")->check(finite());
+      command.add_option("--phase-margin-deg", options.spec.phase_margin_deg, "Phase margin")->check(margins());
   auto* mu = command
                  .add_option("--mu", options.spec.mu,
                              "Order of the derivative, which gives up iso-damping (default: iso-damped)")
-                 ->check(finite());
+                 ->check(mus());
   command
       .add_option("--period-s", options.spec.period_s,
                   "For how long the robot holds its duty; 0: not sampled, as in the paper (default: 0.01)")
-      ->check(non_negative());
+      ->check(from_to(0, analysis::kLongestPeriod_s));
   command.add_flag("--velocity-loop", options.spec.is_velocity_loop,
                    "Without the integrator from velocity to position");
   auto* robustness = command.add_flag("--robustness", options.with_robustness,

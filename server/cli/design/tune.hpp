@@ -6,6 +6,10 @@
 #include "server/cli/design/control_files.hpp"
 #include "server/cli/terminal/output.hpp"
 
+namespace CLI {
+class Validator;
+}
+
 namespace server::cli {
 
 inline constexpr int kInfeasible = 3;  // exit status
@@ -20,6 +24,11 @@ struct Tune {
 };
 
 void add_options(CLI::App& command, Tune& options);
+
+// Of a specification, for CLI::Option::check: what the API takes, too.
+CLI::Validator crossovers();  // rad/s
+CLI::Validator margins();     // degrees
+CLI::Validator mus();
 
 // 0, or kInfeasible when nothing meets the specification. A map is always 0.
 int run(const Tune& options, std::ostream& out);

@@ -9,6 +9,7 @@
 #include <iostream>
 #include <limits>
 
+#include "server/cli/design/tune.hpp"
 #include "server/cli/experiments/autotune_comparison.hpp"
 #include "server/cli/experiments/profile_file.hpp"
 #include "server/cli/terminal/options.hpp"
@@ -114,12 +115,11 @@ void add_options(CLI::App& command, Autotune& options) {
   command.add_option("--robot", options.request.robot_id, "The robot")->required()->check(named());
   command.add_option("--crossover-rad-s", options.request.crossover_rad_s, "Gain crossover")
       ->required()
-      ->check(from_to(1e-3, 1e4));
+      ->check(crossovers());
   command.add_option("--phase-margin-deg", options.request.phase_margin_deg, "Phase margin")
       ->required()
-      ->check(from_to(0.1, 179.9));
-  command.add_option("--mu", options.request.mu, "Order of the derivative, which gives up iso-damping")
-      ->check(from_to(0.01, 1.99));
+      ->check(margins());
+  command.add_option("--mu", options.request.mu, "Order of the derivative, which gives up iso-damping")->check(mus());
   add_experiments(command, options);
   add_search(command, options.search);
   for (const char* searching :
@@ -130,12 +130,17 @@ void add_options(CLI::App& command, Autotune& options) {
       ->check(named());
   command.add_flag("--confirm", options.request.confirm,
                    "The controller may have a wider duty range than the one in force");
+  command
+      .add_flag("--store-fluid-model", options.request.stores_fluid_model,
+                "Keep the model as that of the robot's fluid: other robots get it when they are put into it")
+      ->excludes("--model-free");
   command.add_option("--data", options.data_dir, "Folder of the station (default: rheonaut-data)")->check(named());
   command.add_flag("--json", options.json, "As JSON");
   command.footer(
       "Exit status 3: nothing meets the specification; what comes near is printed. 5: an experiment was aborted, a "
       "job\n"
-      "failed, or the robot did not report the controller. With --resume the same command goes on from there.\n"
+      "failed, or the robot did not report the controller or the model. With --resume the same command goes on from\n"
+      "there.\n"
       "Example: rheonaut autotune --robot sim-1 --crossover-rad-s 3 --phase-margin-deg 90 --resume tune.json --data "
       "lab");
 }

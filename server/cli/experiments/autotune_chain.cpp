@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 #include <fmt/ostream.h>
 
+#include "server/cli/accounts/fluid.hpp"
 #include "server/cli/experiments/autotune_comparison.hpp"
 
 namespace server::cli {
@@ -20,6 +21,8 @@ constexpr const char* kModel = "model";
 constexpr const char* kTuning = "tuning";
 constexpr const char* kController = "controller";
 constexpr const char* kPush = "push";
+constexpr const char* kRobotModel = "robot_model";
+constexpr const char* kFluidModel = "fluid_model";
 constexpr const char* kVerification = "verification";
 constexpr const char* kComparison = "comparison";
 
@@ -58,7 +61,8 @@ AutotuneChain::AutotuneChain(AskStation ask, AutotuneRequest request, AutotuneSt
       progress_{progress} {}
 
 AutotuneEnd AutotuneChain::run() {
-  (void)(identify() && keep_model() && tune() && keep_controller() && push() && verify() && compare());
+  (void)(identify() && keep_model() && tune() && keep_controller() && push() && send_model() && store_fluid_model() &&
+         verify() && compare());
   return end_;
 }
 
@@ -167,6 +171,7 @@ bool AutotuneChain::keep_model() {
   const auto id = station_.post("/api/v1/designs", body).at("design_id").get<std::int64_t>();
   state_.finish(kModel, {{"design_id", id},
                          {"parameters", found.at("parameters")},
+                         {"estimator", found.value("estimator", json())},
                          {"fit_percent", found.at("fit_percent")},
                          {"validation", found.value("validation", json())},
                          {"warnings", found.value("warnings", json::array())},
@@ -255,6 +260,62 @@ bool AutotuneChain::push() {
                         {"controller_id", controller.at("controller_id")},
                         {"checksum", controller.at("checksum")}});
   say(fmt::format("push: controller {} is in force, bit for bit", controller.at("controller_id").dump()));
+  return true;
+}
+
+// SAFETY: the model of another fluid, or of one that nobody has named, is not sent.
+std::string AutotuneChain::why_not_sent(const json& run, const json& estimator) const {
+  if (!estimator.is_object()) return "the file of this autotune does not have it; begin a new one";
+  if (estimator.contains("refused")) return estimator.at("refused").get<std::string>();
+  if (run.at("robot_id") != request_.robot_id) {
+    return fmt::format("run {} is of another robot, {}", run.at("run_id").dump(), run.at("robot_id").dump());
+  }
+  const json fluid = station_.get("/api/v1/robots/" + request_.robot_id).at("fluid");
+  if (run.at("fluid") == fluid && fluid.is_string() && fluid != "") return "";
+  return fmt::format(
+      "run {} was recorded in the fluid {}, and the robot is in {} (rheonaut robot fluid {} --set FLUID "
+      "says which, before the run)",
+      run.at("run_id").dump(), run.at("fluid").dump(), fluid.dump(), request_.robot_id);
+}
+
+json AutotuneChain::robot_model() const {
+  const json& found = state_.of(kModel);
+  json model = found.at("estimator");
+  model["plant"] = found.at("parameters");
+  model["name"] = fmt::format("autotune of {}, run {}", request_.robot_id, *state_.number(kIdentification, "run_id"));
+  if (const json doubts = found.value("doubts", json()); !doubts.is_null()) model["doubts"] = doubts;
+  return model;
+}
+
+// Also when it was sent before and nothing is verified yet: the robot may have booted since.
+bool AutotuneChain::send_model() {
+  if (request_.is_model_free || state_.is_done(kVerification)) return true;
+  state_.forget(kRobotModel);
+  const json run = station_.get(fmt::format("/api/v1/runs/{}", *state_.number(kIdentification, "run_id")));
+  const std::string not_sent = why_not_sent(run, state_.of(kModel).value("estimator", json()));
+  if (!not_sent.empty()) {
+    state_.finish(kRobotModel, {{"state", "not_sent"}, {"reason", not_sent}});
+    say(fmt::format("robot model: not sent: {}; the robot's position stays as uncertain as before", not_sent));
+    return true;
+  }
+  say(fmt::format("robot model: to {}", request_.robot_id));
+  const json now = station_.model_sent_to(request_.robot_id, {{"fluid", run.at("fluid")}, {"model", robot_model()}});
+  const std::string state = now.at("state").get<std::string>(), reason = now.value("reason", "");
+  if (!model_has_arrived(now)) return stop(kRobotModel, fmt::format("{}: {}", state, reason));
+  state_.finish(kRobotModel, {{"state", state}, {"reason", reason}, {"fluid", run.at("fluid")}});
+  say(state == "confirmed" ? "robot model: confirmed, read back bit for bit; until the robot boots or its fluid changes"
+                           : "robot model: assumed: " + reason);
+  return true;
+}
+
+bool AutotuneChain::store_fluid_model() {
+  if (!request_.stores_fluid_model || state_.is_done(kFluidModel)) return true;
+  const json fluid = state_.is_done(kRobotModel) ? state_.of(kRobotModel).value("fluid", json()) : json();
+  if (!fluid.is_string()) return stop(kFluidModel, "the robot was not sent the model, so no fluid is given it");
+  station_.post(path_of_fluid_model(fluid), robot_model());
+  state_.finish(kFluidModel, {{"fluid", fluid}});
+  say(fmt::format("fluid model: it is that of {} from now on, which other robots get when they are put into it",
+                  fluid.get<std::string>()));
   return true;
 }
 

@@ -6,6 +6,8 @@
 //                    model-free: job `tune_measured` on the run                  → kp, kd, mu, coefficients
 //   controller       its result kept                                             → design
 //   push             sent, reported back by the robot, compared bit for bit      → in force
+//   robot_model      the model, for the robot's estimator, sent and read back    → confirmed, assumed, not_sent
+//   fluid_model      if asked for: it becomes the model of that fluid            → other robots in it
 //   verification     an experiment in closed loop                                → run
 //   comparison       its metrics beside the prediction
 //
@@ -32,8 +34,9 @@ struct AutotuneRequest {
   nlohmann::json search = nlohmann::json::object();  // of the model: fields of its job, those that were given
   double crossover_rad_s = 0, phase_margin_deg = 0;
   std::optional<double> mu;
-  bool is_model_free = false;  // the profile, or the run, has three tones; no model is found
-  bool confirm = false;        // of a controller with a wider duty range than the one in force
+  bool is_model_free = false;       // the profile, or the run, has three tones; no model is found
+  bool confirm = false;             // of a controller with a wider duty range than the one in force
+  bool stores_fluid_model = false;  // the model becomes that of the robot's fluid, which other robots get later
 };
 
 // What the file of an autotune must agree with; the specification may change until a controller is kept.
@@ -61,6 +64,8 @@ class AutotuneChain {
   bool tune();
   bool keep_controller();
   bool push();
+  bool send_model();
+  bool store_fluid_model();
   bool verify();
   bool compare();
 
@@ -69,7 +74,10 @@ class AutotuneChain {
   std::optional<std::int64_t> run_of_experiment(const std::string& stage, const nlohmann::json& profile);
   nlohmann::json identify_body() const;
   nlohmann::json tune_body() const;
-  bool is_feasible();  // of the result; says why not
+  // Why the model is not for this robot; empty: it is.
+  std::string why_not_sent(const nlohmann::json& run, const nlohmann::json& estimator) const;
+  nlohmann::json robot_model() const;  // of the model, as the API takes it
+  bool is_feasible();                  // of the result; says why not
   void say(const std::string& line);
   bool stop(const std::string& stage, const std::string& why);  // false
   void show(const nlohmann::json& job_or_experiment);

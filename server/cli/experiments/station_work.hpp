@@ -38,6 +38,9 @@ class StationWork {
   // As the station answers it, ended: a job with its result, an experiment with its runs.
   nlohmann::json finished_job(std::int64_t job_id) const;
   nlohmann::json finished_experiment(std::int64_t experiment_id) const;
+  // Sends a robot a model, and returns what has become of it (the member `model` of the robot's document), after 40 s
+  // at most.
+  nlohmann::json model_sent_to(const std::string& robot_id, const nlohmann::json& body) const;
   // An experiment that waits and is held, since its client was away or the station has restarted, is resumed; any other
   // is left as it is.
   void resume_what_was_left(std::int64_t experiment_id) const;

@@ -29,8 +29,10 @@ inline constexpr ExitStatus kExitStatuses[] = {
      "identify: the search did not converge, its result is not finite, or the model explains less than 1 % of every "
      "run; the best result is printed"},
     {5,
-     "not confirmed, or it did not end well: stop: a robot has not confirmed; robot parameters, robot controller: "
-     "accepted, but not reported back; job, experiment: failed, cancelled, aborted or interrupted; autotune: a stage "
+     "not confirmed, or it did not end well: stop: a robot has not confirmed; robot parameters, robot controller, "
+     "robot "
+     "fluid --model: accepted, but not reported back; job, experiment: failed, cancelled, aborted or interrupted; "
+     "autotune: a stage "
      "did not end well; robot commission: the record is not signed"},
 };
 

@@ -1,4 +1,4 @@
-// What somebody has said of the fluid of a robot, and the model that belongs to it.
+// What somebody has said of the fluid of a robot, and the model that the robot is to have for it.
 #pragma once
 
 #include <cstdint>
@@ -17,6 +17,9 @@ struct FluidNaming {
   BootId boot_id = 0;
   std::string fluid;                // empty: not known
   std::optional<FluidModel> model;  // none: a confirmation is taken back
+  // An own model: one that was sent to this robot alone. When the fluid's model of the list was set, at that time; 0:
+  // there was none. Nothing: the model is of the list.
+  std::optional<std::int64_t> own_beside_us{};
 };
 
 }  // namespace server::station

@@ -22,6 +22,10 @@ void add_fluid(RobotModel& into, const std::string& fluid, const FluidModel& mod
   into.set_at_us = model.set_at_us;
 }
 
+std::string which(const FluidNaming& naming) {
+  return (naming.own_beside_us ? "its own model of " : "") + naming.fluid;
+}
+
 }  // namespace
 
 RobotModel assumed_model(std::string why) { return model_in(ModelState::assumed, std::move(why)); }
@@ -37,9 +41,9 @@ RobotModel model_on_its_way(const FluidNaming& naming) {
   return model;
 }
 
-RobotModel confirmed_model(const std::string& fluid, const FluidModel& model) {
-  RobotModel confirmed = model_in(ModelState::confirmed, "");
-  add_fluid(confirmed, fluid, model);
+RobotModel confirmed_model(const FluidNaming& naming) {
+  RobotModel confirmed = model_in(ModelState::confirmed, naming.own_beside_us ? "sent to this robot alone" : "");
+  add_fluid(confirmed, naming.fluid, *naming.model);
   return confirmed;
 }
 
@@ -54,7 +58,8 @@ RobotModel model_confirmed_by_command() { return model_in(ModelState::confirmed,
 
 RobotModel failed_model(const FluidNaming& naming, const Error& error) {
   if (!naming.model) return model_in(ModelState::failed, fmt::format("{}: {}", kNotTakenBack, error.detail));
-  RobotModel failed = model_in(ModelState::failed, error.detail);
+  RobotModel failed =
+      model_in(ModelState::failed, error.detail + (naming.own_beside_us ? "; then send the model again" : ""));
   add_fluid(failed, naming.fluid, *naming.model);
   return failed;
 }
@@ -62,11 +67,11 @@ RobotModel failed_model(const FluidNaming& naming, const Error& error) {
 RobotModel model_to_be_taken_back() { return model_in(ModelState::failed, kNotTakenBack); }
 
 std::string confirmed_words(const FluidNaming& naming) {
-  return fmt::format("{} by {}", naming.fluid, naming.by.actor);
+  return fmt::format("{} by {}", which(naming), naming.by.actor);
 }
 
 std::string held_as_assumed_words(const FluidNaming& naming) {
-  return fmt::format("{} by {}, as assumed only: {}", naming.fluid, naming.by.actor, naming.model->assumed_because);
+  return fmt::format("{}, as assumed only: {}", confirmed_words(naming), naming.model->assumed_because);
 }
 
 std::string taken_back_words(const FluidNaming& naming) {
@@ -75,6 +80,7 @@ std::string taken_back_words(const FluidNaming& naming) {
 }
 
 std::string not_sent_words(const FluidNaming& naming, const Error& error) {
+  if (naming.own_beside_us) return fmt::format("{} could not be sent: {}", which(naming), error.detail);
   return fmt::format("the model of '{}' could not be sent: {}", naming.fluid, error.detail);
 }
 

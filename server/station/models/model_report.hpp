@@ -18,7 +18,7 @@ RobotModel unsent_model(const FluidModelList& models, const std::string& fluid);
 
 // The model is on its way, or what was confirmed before is being taken back.
 RobotModel model_on_its_way(const FluidNaming& naming);
-RobotModel confirmed_model(const std::string& fluid, const FluidModel& model);
+RobotModel confirmed_model(const FluidNaming& naming);  // which has a model
 // The robot holds it, and is as unsure as before: the model is in doubt.
 RobotModel model_held_as_assumed(const FluidNaming& naming);
 // Somebody has confirmed what the robot holds; the station knows no fluid of it.

@@ -49,24 +49,43 @@ ModelSender::ModelSender(asio::io_context& loop, runtime::TaskGroup& tasks, runt
                          const FluidModelList& models)
     : loop_{loop}, tasks_{tasks}, clock_{clock}, station_{station}, models_{models}, wake_{loop_} {
   station.add_sink(*this);
-  station.set_on_fluid_named([this](const RobotState& robot, const Author& by) { on_fluid_named(robot, by); });
+  station.set_on_model_wanted([this](const RobotState& robot, const Author& by, std::optional<FluidModel> own) {
+    on_model_wanted(robot, by, std::move(own));
+  });
   tasks.spawn("models of fluids", run());
 }
 
+const FluidModel* ModelSender::own_model(const RobotState& robot, const Entry& entry) const {
+  const FluidNaming& naming = entry.naming;
+  const bool is_of_now = naming.fluid == robot.fluid && naming.boot_id == robot.boot_id;
+  if (!naming.own_beside_us || !naming.model || !is_of_now) return nullptr;
+  const FluidModel* listed = models_.find(robot.fluid);
+  return listed != nullptr && listed->set_at_us != *naming.own_beside_us ? nullptr : &*naming.model;
+}
+
 // SAFETY: what was confirmed for another fluid is owed from here on, whatever becomes of the new model.
-void ModelSender::on_fluid_named(const RobotState& robot, const Author& by) {
+void ModelSender::on_model_wanted(const RobotState& robot, const Author& by, std::optional<FluidModel> own) {
   Entry& entry = entries_[robot.id];
-  const FluidModel* model = models_.find(robot.fluid);
+  if (const FluidModel* before = own_model(robot, entry); before != nullptr && !own) own = *before;
+  const FluidModel* listed = models_.find(robot.fluid);
+  const FluidModel* model = own ? &*own : listed;
   const std::optional<bool> flag = entry.seen.flag();
   const bool is_connected = robot.link == LinkState::connected;
   const bool is_in_sight = is_connected && entry.seen.boot_id() == robot.boot_id && flag && !entry.is_at_work;
   const bool may_be_confirmed = robot.boot_id != 0 && (!is_in_sight || *flag);
   const bool is_this = is_in_sight && *flag && robot.model.state == ModelState::confirmed &&
                        robot.model.fluid == robot.fluid && !robot.fluid.empty();
-  entry.naming = {entry.naming.number + 1, by, robot.boot_id, robot.fluid,
-                  model == nullptr ? std::nullopt : std::optional{*model}};
+  entry.naming = {entry.naming.number + 1,
+                  by,
+                  robot.boot_id,
+                  robot.fluid,
+                  model == nullptr ? std::nullopt : std::optional{*model},
+                  {}};
+  if (own) entry.naming.own_beside_us = listed == nullptr ? 0 : listed->set_at_us;
   const bool is_confirmed_model = model != nullptr && model->is_confirmed();
-  if (is_confirmed_model && is_this && holds(station_.settings(robot.id)->parameters, *model)) return;
+  if (is_confirmed_model && is_this && holds(station_.settings(robot.id)->parameters, *model)) {
+    return station_.set_model(robot.id, confirmed_model(entry.naming));  // own, or the list's: which of them may differ
+  }
   const bool is_to_be_taken_back = !is_confirmed_model || !is_this;
   entry.owes = entry.owes || (may_be_confirmed && is_to_be_taken_back);
   if (entry.owes) open_.insert(robot.id);
@@ -129,7 +148,7 @@ void ModelSender::conclude(const RobotId& id, const FluidNaming& naming, const O
     station_.set_model(id, model_held_as_assumed(naming));
     station_.note_model(id, "model_assumed", held_as_assumed_words(naming));
   } else if (naming.model) {
-    station_.set_model(id, confirmed_model(naming.fluid, *naming.model));
+    station_.set_model(id, confirmed_model(naming));
     station_.note_model(id, "model_confirmed", confirmed_words(naming));
   } else {
     station_.set_model(id, unsent_model(models_, naming.fluid));
@@ -181,10 +200,19 @@ void ModelSender::on_in_force(const RobotState& robot, const InForceRecord& reco
   look_again(robot.id);
 }
 
+// The robot holds the model that was sent last, as confirmed or as assumed.
+bool ModelSender::has_arrived(const RobotModel& now, const Entry& entry) {
+  if (entry.is_at_work || !entry.naming.model || now.set_at_us != entry.naming.model->set_at_us) return false;
+  return now.state == ModelState::confirmed || now.state == ModelState::assumed;
+}
+
 // SAFETY: a model that is on its way in nobody's name any more is taken back; what is owed, the station owes from now.
 void ModelSender::on_right_ended(const runtime::EndedRight& right) {
   for (auto& [id, entry] : entries_) {
     if (!right.is_of(entry.naming.by.actor)) continue;
+    if (!has_arrived(station_.find(id)->model, entry)) {
+      entry.naming.own_beside_us.reset();  // nobody else's naming sends what this actor could not
+    }
     entry.naming.by = kOfTheStation;
     if (!entry.is_at_work) continue;
     ++entry.naming.number;  // the exchange ends, and its task goes on with this
@@ -226,6 +254,7 @@ void ModelSender::follow(const RobotState& robot, Entry& entry) {
   open_.erase(robot.id);
   if (entry.naming.boot_id != robot.boot_id && entry.naming.boot_id != 0) {
     entry.naming.boot_id = 0;
+    entry.naming.own_beside_us.reset();
     entry.owes = false;  // a boot takes every confirmation back
     station_.set_model(robot.id,
                        assumed_model(robot.fluid.empty() ? "" : "the robot has booted: name its fluid again"));
@@ -241,7 +270,8 @@ void ModelSender::follow(const RobotState& robot, Entry& entry) {
 
 void ModelSender::follow_confirmation(const RobotState& robot, Entry& entry) {
   // SAFETY: a model in doubt is confirmed for no robot, also not one that holds its very bits.
-  const FluidModel* stored = models_.find(robot.fluid);
+  const FluidModel* own = own_model(robot, entry);
+  const FluidModel* stored = own != nullptr ? own : models_.find(robot.fluid);
   const FluidModel* model = stored != nullptr && stored->is_confirmed() ? stored : nullptr;
   const auto [finding, is_open] =
       judge(robot, entry.seen, station_.settings(robot.id)->parameters, entry.naming.model, model, clock_.steady_us());
@@ -251,8 +281,9 @@ void ModelSender::follow_confirmation(const RobotState& robot, Entry& entry) {
   } else if (finding == Finding::model_of_fluid) {
     entry.naming.boot_id = robot.boot_id;
     entry.naming.fluid = robot.fluid;
-    entry.naming.model = *model;  // SAFETY: other bits under the flag are noticed by it
-    station_.set_model(robot.id, confirmed_model(robot.fluid, *model));
+    if (own == nullptr) entry.naming.own_beside_us.reset();
+    entry.naming.model = FluidModel{*model};  // SAFETY: other bits under the flag are noticed by it
+    station_.set_model(robot.id, confirmed_model(entry.naming));
   } else if (finding == Finding::by_command) {
     entry.naming.boot_id = robot.boot_id;
     station_.set_model(robot.id, model_confirmed_by_command());

@@ -1,12 +1,16 @@
 // Gives each robot the model of the fluid that it swims in, and takes back what was confirmed for another: starts each
 // exchange, keeps what is owed, and publishes what has become of it.
 //
-//   somebody names the fluid of a robot (POST …/fluid, or a run that names one)
-//     → ModelExchange sends the model, or takes the confirmation back, on behalf of the actor that named the fluid
+//   somebody names the fluid of a robot (POST …/fluid, or a run that names one), or sends it a model of its own
+//     → ModelExchange sends the model, or takes the confirmation back, on behalf of that actor
 //   a robot reports its confirmation or its parameters
 //     → judge() finds whether the confirmation stands
 //
 // What could not be done stands in RobotState::model and an event.
+//
+// An own model was sent to one robot alone, for the fluid that was named for it. When that fluid is named again the
+// robot keeps it, unless the list's model of the fluid was set or changed meanwhile. It ends with the robot's boot, and
+// when another fluid is named.
 //
 // SAFETY: a confirmation that is not this fluid's is owed to be taken back, however long that takes: after an exchange
 // has failed it is tried again at rest, each kRetryInterval, until telemetry shows that it is gone or the robot has
@@ -67,7 +71,9 @@ class ModelSender final : public StationSink {
   boost::asio::awaitable<void> finish(RobotId id, FluidNaming naming, Outcome outcome);
   boost::asio::awaitable<void> look_at(RobotId id);
 
-  void on_fluid_named(const RobotState& robot, const Author& by);
+  void on_model_wanted(const RobotState& robot, const Author& by, std::optional<FluidModel> own);
+  static bool has_arrived(const RobotModel& now, const Entry& entry);
+  const FluidModel* own_model(const RobotState& robot, const Entry& entry) const;  // null: none that stands
   void begin(const RobotId& id, Entry& entry);
   void conclude(const RobotId& id, const FluidNaming& naming, const Outcome& outcome);
   void conclude_failure(const RobotId& id, const FluidNaming& naming, const Error& error);

@@ -21,6 +21,16 @@ std::string control_detail(const std::string& cause, const std::string& holder) 
 
 std::string fluid_detail(const std::string& before) { return audit_detail({{"before", before}}); }
 
+std::string model_detail(const FluidModel& model) {
+  nlohmann::json detail{{"fit_error", model.fit_error}};
+  if (!model.assumed_because.empty()) detail["assumed_because"] = model.assumed_because;
+  const auto document = nlohmann::json::parse(model.document, nullptr, false);
+  if (document.is_object() && document.contains("confirmed_because")) {
+    detail["confirmed_because"] = document.at("confirmed_because");
+  }
+  return audit_detail(detail);
+}
+
 std::string refused_command(const std::string& kind, const std::string& arguments) {
   return nlohmann::json{{"kind", kind}, {"arguments", nlohmann::json::parse(arguments, nullptr, false)}}.dump();
 }
@@ -30,5 +40,7 @@ std::string refused_stop() { return nlohmann::json{{"kind", "emergency_stop"}}.d
 std::string refused_control(const std::string& action) { return nlohmann::json{{"wish", action}}.dump(); }
 
 std::string refused_fluid(const std::string& fluid) { return nlohmann::json{{"fluid", fluid}}.dump(); }
+
+std::string refused_model(const std::string& fluid) { return nlohmann::json{{"model_of", fluid}}.dump(); }
 
 }  // namespace server::station

@@ -86,7 +86,13 @@ asio::awaitable<void> Checkpointer::run() {
     const CheckpointOutcome outcome = co_await worker_.run(std::move(pass));
     note(outcome);
     const bool moved_all = !outcome.is_busy && outcome.problem.empty() && outcome.moved_frames >= outcome.log_frames;
-    if (moved_all) passed_commits_ = commits;
+    if (moved_all) {
+      passed_commits_ = commits;
+      retry_wait_ = 0us;
+    } else {
+      retry_wait_ = std::min(interval_, std::max(kTryInterval, 2 * retry_wait_));
+      next_pass_us_ = std::min(next_pass_us_, clock_.steady_us() + retry_wait_.count());
+    }
     is_passing_ = false;
     was_passed_ = state_.bytes >= checkpoint_bytes_;
     ++state_.checkpoints;

@@ -5,7 +5,8 @@
 //
 // A shorter log is moved by a pass at the first commit, with the first samples, and whenever the latest pass is
 // `interval` ago and something was committed since: so who loses the log loses seconds, and never the schema
-// (database.cpp). What such a pass leaves waits for the next one.
+// (database.cpp). What such a pass leaves (somebody reads in the log, or it failed) is tried again after 200 ms, then
+// after twice as long each time, up to `interval`.
 //
 // When the log has grown by half again, a commit waits for a pass that is under way, and the disk thread waits for
 // readers that stand in the log (ours are gone after 250 ms). So it grows no further than by one more commit, and stays
@@ -104,6 +105,7 @@ class Checkpointer {
   std::uint64_t commits_ = 0;         // that have gone into the log
   std::uint64_t passed_commits_ = 0;  // are in the database, too, and maybe more
   std::int64_t next_pass_us_ = 0;     // steady; of a log that is short
+  microseconds retry_wait_{0};        // after passes that left something; 0: the latest one left nothing
   bool is_passing_ = false;
   bool was_passed_ = false;           // since the log began, and something of it may be left
   std::uint64_t moved_bytes_ = 0;     // of this log, into the database

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "server/runtime/exceptions.hpp"
+#include "server/station/state/audit_details.hpp"
 #include "server/storage/audit/audit_chain.hpp"
 #include "server/storage/database/database.hpp"
 #include "server/storage/database/statement.hpp"
@@ -50,17 +51,6 @@ std::vector<Named> read_in_force(SQLite::Database& database) {
   return models;
 }
 
-// With the reason of who confirms it all the same.
-std::string audit_detail_of(const station::FluidModel& model) {
-  nlohmann::json detail{{"fit_error", model.fit_error}};
-  if (!model.assumed_because.empty()) detail["assumed_because"] = model.assumed_because;
-  const auto document = nlohmann::json::parse(model.document, nullptr, false);
-  if (document.is_object() && document.contains("confirmed_because")) {
-    detail["confirmed_because"] = document.at("confirmed_because");
-  }
-  return station::audit_detail(detail);
-}
-
 // Null: the fluid has none from now on.
 void append(SQLite::Database& database, const std::string& fluid, const station::FluidModel* model,
             const station::Author& by) {
@@ -81,16 +71,23 @@ void append(SQLite::Database& database, const std::string& fluid, const station:
   note.by = by;
   note.action = model != nullptr ? "fluid.model_set" : "fluid.model_removed";
   note.subject = fluid;
-  if (model != nullptr) note.detail = audit_detail_of(*model);
+  if (model != nullptr) note.detail = station::model_detail(*model);
   AuditChain{database}.append(note);
   transaction.commit();
 }
 
+void append_sent(SQLite::Database& database, const std::string& robot_id, const std::string& fluid,
+                 const station::FluidModel& model, const station::Author& by) {
+  SQLite::Transaction transaction{database, SQLite::TransactionBehavior::IMMEDIATE};
+  AuditChain{database}.append({by, robot_id, "robot.model_sent", fluid, station::model_detail(model)});
+  transaction.commit();
+}
+
 // Returned to the caller as an error: a full disk does not end the station.
-Result<void> stored(Database& database, const std::string& fluid, const station::FluidModel* model,
-                    const station::Author& by) {
+template <class Append>
+Result<void> stored(Append append) {
   try {
-    append(database.handle(), fluid, model, by);
+    append();
     return {};
   } catch (const SQLite::Exception& error) {
     return fail(ErrorCode::unavailable,
@@ -111,11 +108,23 @@ asio::awaitable<Result<station::FluidModel>> FluidModels::set(std::string fluid,
   by.at_us = clock_.utc_us();
   model.set_by = by.actor;
   model.set_at_us = by.at_us;
-  auto job = [fluid, model, by](Database& database) { return stored(database, fluid, &model, by); };
+  auto job = [fluid, model, by](Database& database) {
+    return stored([&] { append(database.handle(), fluid, &model, by); });
+  };
   const Result<void> done = co_await recorder_.on_disk(std::move(job));
   if (!done) co_return std::unexpected{done.error()};
   list_.put(fluid, model);
   co_return model;
+}
+
+asio::awaitable<Result<void>> FluidModels::note_sent(std::string robot_id, std::string fluid, station::FluidModel model,
+                                                     station::Author by) {
+  by.at_us = clock_.utc_us();
+  auto job = [=](Database& database) {
+    return stored([&] { append_sent(database.handle(), robot_id, fluid, model, by); });
+  };
+  const Result<void> done = co_await recorder_.on_disk(std::move(job));
+  co_return done;
 }
 
 asio::awaitable<Result<void>> FluidModels::remove(std::string fluid, station::Author by) {
@@ -123,7 +132,7 @@ asio::awaitable<Result<void>> FluidModels::remove(std::string fluid, station::Au
     co_return fail(ErrorCode::not_found, fmt::format("the fluid '{}' has no model", fluid), "no_model");
   }
   by.at_us = clock_.utc_us();
-  auto job = [fluid, by](Database& database) { return stored(database, fluid, nullptr, by); };
+  auto job = [fluid, by](Database& database) { return stored([&] { append(database.handle(), fluid, nullptr, by); }); };
   const Result<void> done = co_await recorder_.on_disk(std::move(job));
   if (done) list_.remove(fluid);
   co_return done;

@@ -29,6 +29,11 @@ class FluidModels {
   boost::asio::awaitable<Result<station::FluidModel>> set(std::string fluid, station::FluidModel model,
                                                           station::Author by);
 
+  // Writes into the audit that somebody sends one robot this model of the fluid. unavailable when the disk cannot be
+  // written.
+  boost::asio::awaitable<Result<void>> note_sent(std::string robot_id, std::string fluid, station::FluidModel model,
+                                                 station::Author by);
+
   // The fluid has no model from then on. not_found when it has none.
   boost::asio::awaitable<Result<void>> remove(std::string fluid, station::Author by);
 

@@ -114,6 +114,37 @@ json doubt_of(const char* code, json widening) {
       {"code", code}, {"value", 0.5}, {"widening", std::move(widening)}, {"grave", false}, {"text", "says the client"}};
 }
 
+TEST_F(FluidModelsRouteTest, OneRobotIsSentAModelOfItsOwnAndNothingOfItIsKept) {
+  const char* of_robot = "/api/v1/robots/r1/model";
+  ASSERT_EQ(ask("POST", kFluidOfRobot, {{"fluid", "water"}}).status, 200);
+  json body{{"fluid", " Water"}, {"model", printed()}};
+  body["model"]["doubts"] = json::array({doubt_of("no_linear_model_over_amplitude", 14.5)});
+  body["model"]["confirmed_because"] = "checked against the camera";
+  const Answered sent = ask("POST", of_robot, body);
+  ASSERT_EQ(sent.status, 200) << sent.body;
+  EXPECT_EQ(sent.parsed()["model"]["fluid"], "water");
+  EXPECT_EQ(sent.parsed()["model"]["fit_error"], 0.0021);
+  EXPECT_EQ(model_of("water"), nullptr);
+  const json entry = ask("GET", "/api/v1/audit?action=robot.model_sent").parsed()["entries"][0];
+  EXPECT_EQ(entry["robot_id"], "r1");
+  EXPECT_EQ(entry["subject"], "water");
+  EXPECT_EQ(entry["detail"]["fit_error"], 0.0021);
+  EXPECT_EQ(entry["detail"]["confirmed_because"], "checked against the camera");
+
+  EXPECT_EQ(ask("POST", "/api/v1/robots/r9/model", body).status, 404);
+  body["fluid"] = "oil";
+  const Answered other = ask("POST", of_robot, body);
+  EXPECT_EQ(other.status, 409);
+  EXPECT_EQ(other.parsed()["reason"], "other_fluid");
+  body["model"]["fit_error"] = 0.2;
+  EXPECT_EQ(ask("POST", of_robot, body).parsed()["reason"], "fit_too_bad");
+  for (const char* missing : {"fluid", "model"}) {
+    json less = body;
+    less.erase(missing);
+    EXPECT_EQ(ask("POST", of_robot, less).status, 400) << missing;
+  }
+}
+
 // SAFETY's test: whether a doubt is grave, the station says by its number.
 TEST_F(FluidModelsRouteTest, OneInGraveDoubtIsAssumedUnlessSomebodySaysWhyNot) {
   json body = printed();

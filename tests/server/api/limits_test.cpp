@@ -108,7 +108,7 @@ void expect_documented(const api::Limit<Number> (&table)[size], const char* type
 TEST(Limits, AreThoseOfTheDocumentInBothDirections) {
   const json document = openapi_document();
   RequestSchemas requests{document};
-  EXPECT_EQ(requests.bodies, 28);
+  EXPECT_EQ(requests.bodies, 29);
   Properties left = requests.limits;
   expect_documented(api::kTextLimits, "string", left);
   expect_documented(api::kIntegerLimits, "integer", left);

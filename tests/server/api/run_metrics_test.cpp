@@ -2,6 +2,8 @@
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 
+#include <random>
+
 #include "base/version.hpp"
 #include "server/analysis/metrics/metrics_json.hpp"
 #include "server/analysis/metrics/repeatability.hpp"
@@ -105,9 +107,24 @@ TEST(Repeatability, IsThatOfIso5725) {
   EXPECT_EQ(result.mean, 2);
   EXPECT_EQ(result.sd, 1);
   EXPECT_NEAR(result.confidence_half_width.value(), 2.4841, 1e-4) << "t(0.975; 2) = 4.3027, over the root of 3";
-  EXPECT_NEAR(result.repeatability_limit.value(), 2.8, 1e-12);
+  EXPECT_NEAR(result.repeatability_limit.value(), 6.0849, 1e-4) << "t(0.975; 2), times the root of 2";
   EXPECT_FALSE(analysis::repeatability_of({values.begin(), 1}).sd);
   EXPECT_FALSE(analysis::repeatability_of({values.begin() + 2, 1}).mean);
+}
+
+TEST(Repeatability, OfTwoFurtherRuns95PercentDifferByLessThanTheLimitHoweverFewItIsFrom) {
+  std::mt19937_64 random{20261130};
+  std::normal_distribution<double> runs{1.8, 0.04};
+  for (const std::size_t repeats : {2U, 3U, 5U, 30U}) {
+    constexpr int kTrials = 20'000;
+    int held = 0;
+    for (int i = 0; i < kTrials; ++i) {
+      std::vector<std::optional<double>> values(repeats);
+      for (auto& value : values) value = runs(random);
+      held += std::abs(runs(random) - runs(random)) <= analysis::repeatability_of(values).repeatability_limit.value();
+    }
+    EXPECT_NEAR(static_cast<double>(held) / kTrials, 0.95, 0.006) << repeats << " repeats";
+  }
 }
 
 class RunMetricsTest : public ApiTest {

@@ -143,9 +143,14 @@ TEST_F(BadInput, ValuesAreRefusedInOneSentence) {
     return answer.error;
   };
   EXPECT_THAT(said("tune --crossover-rad-s 0 --phase-margin-deg 90"),
-              HasSubstr("--crossover-rad-s must be positive and finite, is 0"));
+              HasSubstr("--crossover-rad-s must be a number from 0.001 to 10000, is 0"));
+  // It took minutes to say that there is no such controller.
+  EXPECT_THAT(said("tune --crossover-rad-s 1e9 --phase-margin-deg 90"), HasSubstr("from 0.001 to 10000, is 1e9"));
+  EXPECT_THAT(said("tune --map --to-rad-s 1e9"), HasSubstr("--to-rad-s must be a number from 0.001 to 10000"));
+  EXPECT_THAT(said("tune --crossover-rad-s 3 --phase-margin-deg 180"), HasSubstr("from 0.1 to 179.9, is 180"));
+  EXPECT_THAT(said("tune --crossover-rad-s 3 --phase-margin-deg 90 --mu 2"), HasSubstr("from 0.01 to 1.99, is 2"));
   EXPECT_THAT(said("tune --crossover-rad-s nan --phase-margin-deg 90"), HasSubstr("is nan"));
-  EXPECT_THAT(said("tune --crossover-rad-s 5 --phase-margin-deg inf"), HasSubstr("must be a finite number, is inf"));
+  EXPECT_THAT(said("tune --crossover-rad-s 5 --phase-margin-deg inf"), HasSubstr("from 0.1 to 179.9, is inf"));
   EXPECT_THAT(said("bode --points 1e9"), HasSubstr("--points must be a whole number from 2 to 100000, is 1e9"));
   EXPECT_THAT(said("discretise --order 11"), HasSubstr("from 1 to 10, is 11"));
   EXPECT_THAT(said("discretise --method foo"), HasSubstr("--method must be one of direct, oustaloup, is 'foo'"));

@@ -112,11 +112,30 @@ TEST_F(StoreHeadTest, TheFirstSamplesAreInTheFileWithTheirCommit) {
 
 TEST_F(StoreHeadTest, WhatIsOlderThanSecondsIsInTheFile) {
   record(4000);
-  const std::int64_t in_file = number_without_log("SELECT count(*) FROM sample");
-  EXPECT_GE(in_file, 4000 - 2 * 1000 - 300);  // what a pass leaves waits for the next one
-  clock_.run_for(11s);                        // nothing comes any more
+  EXPECT_GE(number_without_log("SELECT count(*) FROM sample"), 4000 - 1000 - 300);
+  clock_.run_for(11s);  // nothing comes any more
   EXPECT_EQ(number_without_log("SELECT count(*) FROM sample"), 4000);
   EXPECT_LE(recorder_->wal().checkpoints, 10U);
+}
+
+TEST_F(StoreHeadTest, WhatAReaderKeptInTheLogIsInTheFileSoonAfterItHasGone) {
+  record(1000);
+  clock_.run_for(11s);
+  const std::uint64_t passes = recorder_->wal().checkpoints;
+  {
+    SQLite::Database reader = storage::open_for_reading(path_);
+    const SQLite::Transaction reads{reader};
+    reader.execAndGet("SELECT count(*) FROM sample");
+    make_slowly(robot_, 100);
+    clock_.run_for(10s);
+    EXPECT_GT(recorder_->wal().checkpoints, passes);
+    EXPECT_LT(number_without_log("SELECT count(*) FROM sample"), 1100);
+    EXPECT_LE(recorder_->wal().checkpoints, passes + 10) << "it is tried less and less often";
+    make_slowly(robot_, 5);
+  }
+  disconnect(robot_);
+  clock_.run_for(7s);  // the longest wait between two tries that began 10 s ago
+  EXPECT_EQ(number_without_log("SELECT count(*) FROM sample"), 1105);
 }
 
 TEST_F(StoreHeadTest, AStopAKillAndAStartAreNoLoss) {

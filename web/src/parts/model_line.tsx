@@ -45,10 +45,12 @@ export function model_notice(model: RobotModel, fluid: string | null, has_model:
     case 'sending':
       return name ? `The model of ${name} is being sent.` : 'The confirmation of the model before is being taken back.';
     case 'confirmed':
-      return name ? `The model of ${name} is in force, fit error ${percent(model.fit_error, 2)} %.` : '';
+      return name ? `The model of ${name} is in force, fit error ${percent(model.fit_error, 2)} %${because}` : '';
     case 'failed':
       return name ? `The model of ${name} could not be sent${because}` : `The model${because}`;
     case 'assumed':
-      return fluid !== null && has_model ? `The model of ${fluid_text(fluid)} is not in force${because}` : '';
+      return fluid !== null && (has_model || model.fit_error !== null)
+        ? `The model of ${fluid_text(fluid)} is not in force${because}`
+        : '';
   }
 }

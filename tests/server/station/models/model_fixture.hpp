@@ -102,6 +102,9 @@ class ModelSenderFixture : public LinkTest {
   void name_fluid(const std::string& fluid, const std::string& actor = "token:local") {
     ASSERT_TRUE(station.set_fluid("r1", fluid, {actor, "", clock.utc_us()}));
   }
+  void send_own(const station::FluidModel& own, const std::string& actor = "token:local") {
+    ASSERT_TRUE(station.send_model("r1", station.find("r1")->fluid, own, {actor, "", clock.utc_us()}));
+  }
   const station::RobotModel& model() const { return station.find("r1")->model; }
   std::vector<std::string> events() const {
     std::vector<std::string> kinds;

@@ -15,7 +15,7 @@ TEST(ModelReportTest, AModelIsReportedWithItsFluidFitAndDateFromItsSendingOn) {
   const std::int64_t set_at_us = some_model().set_at_us;
   EXPECT_EQ(model_on_its_way(named_water()),
             (station::RobotModel{station::ModelState::sending, "water", "", 0.002, set_at_us}));
-  EXPECT_EQ(confirmed_model("water", some_model()),
+  EXPECT_EQ(confirmed_model(named_water()),
             (station::RobotModel{station::ModelState::confirmed, "water", "", 0.002, set_at_us}));
   const Error error{ErrorCode::timed_out, "the motor is on", "motor_on"};
   EXPECT_EQ(failed_model(named_water(), error),
@@ -47,6 +47,13 @@ TEST(ModelReportTest, EventsNameTheFluidAndWhoeverNamedIt) {
   EXPECT_EQ(taken_back_words(named_nothing()), "the robot is in a fluid that is not known");
   EXPECT_EQ(not_sent_words(named_water(), {ErrorCode::rejected, "busy", ""}),
             "the model of 'water' could not be sent: busy");
+  station::FluidNaming own = named_water();
+  own.own_beside_us = 0;
+  EXPECT_EQ(confirmed_words(own), "its own model of water by token:local");
+  EXPECT_EQ(confirmed_model(own).reason, "sent to this robot alone");
+  const Error moves{ErrorCode::timed_out, "the motor is on; stop it", "motor_on"};
+  EXPECT_EQ(not_sent_words(own, moves), "its own model of water could not be sent: the motor is on; stop it");
+  EXPECT_EQ(failed_model(own, moves).reason, "the motor is on; stop it; then send the model again");
 }
 
 }  // namespace

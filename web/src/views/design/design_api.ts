@@ -1,6 +1,6 @@
 // What the view Design asks of the station, and what its jobs answer, as far as the page reads it.
 
-import type { Api, CommandRecord } from '../../api';
+import type { Api, CommandRecord, RobotModel } from '../../api';
 import type { components } from '../../api_types';
 import type { Controller } from '../../experiments_api';
 import type { RunMetrics } from '../runs/runs_api';
@@ -181,6 +181,8 @@ export class DesignApi implements JobsApi {
       undefined,
       { patience_ms: kPushPatience_ms },
     );
+  send_model = (robot_id: string, fluid: string, model: EstimatorBody) =>
+    this.api.ask<{ model: RobotModel }>('POST', `${robot_path(robot_id)}/model`, { fluid, model });
   restore = (robot_id: string, is_confirmed: boolean) =>
     this.api.ask<CommandRecord>(
       'POST',
@@ -201,6 +203,27 @@ export class DesignApi implements JobsApi {
 export function discretised_of(document: unknown): Discretised | null {
   const found = (document as { discretised?: Discretised | null } | null)?.discretised;
   return found?.sections ? found : null;
+}
+
+// What a robot's estimator is sent, with the doubts by which the station judges it.
+export interface EstimatorBody {
+  model_gain_m_s: number[];
+  model_time_constant_s: number[];
+  fit_error: number;
+  plant: Plant | null;
+  name: string;
+  doubts: unknown[];
+}
+
+// Null where a kept model has none: it was typed. Of a fit whose doubts nobody knows none is sent.
+export function estimator_of(kept: { name: string; document: unknown }): EstimatorBody | { refused: string } | null {
+  const { estimator, doubts } = (kept.document ?? {}) as {
+    estimator?: Omit<EstimatorBody, 'plant' | 'name' | 'doubts'> | { refused: string } | null;
+    doubts?: unknown[] | null;
+  };
+  if (!estimator || 'refused' in estimator) return estimator ?? null;
+  if (!doubts) return { refused: 'an earlier version found it, and did not keep what is in doubt; identify it again' };
+  return { ...estimator, plant: plant_of(kept.document), name: kept.name, doubts };
 }
 
 // Doubts about the model that a kept controller was tuned for, in a line; empty: none, or nobody has said.

@@ -10,6 +10,7 @@ import { change_design } from './address';
 import { compared, sent_form, type Coefficient } from './control_law';
 import { discretised_of, plant_doubts_of, type ControllerInForce } from './design_api';
 import type { StepProps } from './parts';
+import { SendModel } from './send_model';
 import { Step } from './step';
 import { kMinus, number_text, type StepState } from './words';
 import { may_record } from './identify_step';
@@ -71,6 +72,7 @@ export function PushStep(props: StepProps) {
             is_auto={state?.mode === 'auto'}
             on_ask={() => (asked.value = question)}
           />
+          <SendModel key={`${robot_id} ${design.model ?? ''}`} session={session} work={work} model={props.model} />
           {is_done && (
             <p class="problem" role="alert">
               {problem}

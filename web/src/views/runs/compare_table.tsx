@@ -24,8 +24,8 @@ export function ComparedFigures({ metrics, problem }: { metrics: RunComparison |
           )}
           <Table metrics={metrics} />
           <p class="quiet">
-            ± is the half width of the 95 % confidence interval of the mean; two repeats differ by less than the
-            repeatability limit (2.8 sd, ISO 5725) in 95 % of cases.
+            ± is the half width of the 95 % confidence interval of the mean; two further runs differ by less than the
+            repeatability limit in 95 % of cases, by Student’s t for so few.
           </p>
         </>
       )}

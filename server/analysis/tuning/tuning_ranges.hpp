@@ -1,0 +1,12 @@
+// What a specification of a tuning may ask for, on the command line and of a job: beyond it are no robots, and to find
+// what is near may take minutes.
+#pragma once
+
+namespace server::analysis {
+
+inline constexpr double kLowestCrossover_rad_s = 1e-3, kHighestCrossover_rad_s = 1e4;
+inline constexpr double kSmallestMargin_deg = 0.1, kLargestMargin_deg = 179.9;
+inline constexpr double kLowestMu = 0.01, kHighestMu = 1.99;
+inline constexpr double kLongestPeriod_s = 1;  // of the robot's controller
+
+}  // namespace server::analysis
