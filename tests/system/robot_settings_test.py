@@ -7,7 +7,7 @@ import re
 import subprocess
 import unittest
 
-from processes import BIN, ROOT, lab
+from processes import BIN, ROOT, lab, wait_until
 
 LINE = re.compile(r"^    (rheonaut robot (?:parameters|controller|fluid) .*?)(?:\s+# exit status (\d+))?$", re.M)
 
@@ -32,6 +32,7 @@ class RobotSettingsTest(unittest.TestCase):
     def test_documented_lines_run(self):
         self.run_line("rheonaut tune --crossover-rad-s 3 --phase-margin-deg 90 --json > c.json")
         self.run_line("rheonaut discretise --controller c.json --json > d.json")
+        self.run_line("rheonaut estimator --plant newtonian --json > model.json")
         for number in (1, 2):
             kept = self.run_line(f"rheonaut design save c.json --kind controller --name c{number} --data lab")
             self.assertEqual(kept.returncode, 0, kept.stderr)
@@ -41,6 +42,20 @@ class RobotSettingsTest(unittest.TestCase):
             with self.subTest(line=line):
                 done = self.run_line(line)
                 self.assertEqual(done.returncode, int(status or 0), done.stderr)
+
+    def test_a_model_of_its_own_is_in_force_until_the_fluid_changes(self):
+        self.run_line("rheonaut estimator --plant newtonian --json > model.json")
+        done = self.run_line("rheonaut robot fluid sim-1 --set water --model model.json --data lab")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIn("sent to this robot alone", done.stdout)
+        model = json.loads((pathlib.Path(self.place.folder) / "model.json").read_text())
+        held = self.parameters()
+        for number, gain in enumerate(model["model_gain_m_s"], 1):
+            self.assertAlmostEqual(held[f"model_gain_{number}_m_s"]["value"], gain, places=6)
+        self.assertEqual(held["model_confirmed"]["value"], 1)
+        self.assertEqual(self.run_line("rheonaut robot fluid sim-1 --set non_newtonian --data lab").returncode, 0)
+        wait_until(lambda: self.station.robot("sim-1")["model"]["state"] == "assumed", 30, "it is taken back")
+        wait_until(lambda: self.parameters()["model_confirmed"]["value"] == 0, 30, "the robot says so")
 
     def test_a_parameter_is_set_and_a_bound_needs_confirm(self):
         done = self.run_line("rheonaut robot parameters sim-1 --set duty_slew_per_s=5.1 --data lab")

@@ -19,6 +19,7 @@ namespace {
 
 using nlohmann::json;
 constexpr int kDone = 200;
+constexpr int kModelLookMs = 50, kModelPatienceMs = 37'000;  // the station answers after 3 s, and tries for 30 s
 
 CLI::App* offer(CLI::App& command, FluidCommand& options, FluidCommand::Act act, const char* name,
                 const char* purpose) {
@@ -85,6 +86,18 @@ json model_in_file(const std::filesystem::path& file, const std::string& confirm
   }
   if (!confirm_because.empty()) model["confirmed_because"] = confirm_because;
   return model;
+}
+
+json model_sent_to(const AskStation& ask, const std::string& robot_id, const json& body) {
+  const std::string robot = "/api/v1/robots/" + robot_id;
+  json now = asked(ask("POST", robot + "/model", body)).at("model");
+  BusyWait busy{{.pause = std::chrono::milliseconds{kModelLookMs}}};
+  for (int looks = 0; now.at("state") == "sending" && looks < kModelPatienceMs / kModelLookMs; ++looks) {
+    busy.pause();
+    StationAnswer answer = ask("GET", robot, nullptr);
+    if (!busy.is_busy(answer)) now = asked(std::move(answer)).at("model");
+  }
+  return now;
 }
 
 bool model_has_arrived(const json& model) {

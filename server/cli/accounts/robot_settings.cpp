@@ -219,8 +219,11 @@ int set_fluid(const Robot& robot, const RobotSettingsCommand& options, std::ostr
 int send_model(const Robot& robot, const RobotSettingsCommand& options, std::ostream& out) {
   const json sent = model_in_file(options.model, options.confirm_because);
   const json fluid = robot.post("/fluid", {{"fluid", options.set}}).at("fluid");
-  const json body{{"fluid", fluid}, {"model", sent}};
-  const json model = robot.post("/model", body).at("model");
+  const StationClient station{options.data_dir};
+  const auto ask = [&station](const std::string& method, const std::string& target, const json& body) {
+    return station.ask(method, target, body);
+  };
+  const json model = model_sent_to(ask, options.robot_id, {{"fluid", fluid}, {"model", sent}});
   print_fluid({{"fluid", fluid}, {"model", model}}, options.json, out);
   return model_has_arrived(model) ? 0 : not_done(kNotVerified, "the model: " + model_words(model));
 }

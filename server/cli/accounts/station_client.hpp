@@ -6,6 +6,7 @@
 #include <chrono>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
@@ -17,6 +18,9 @@ namespace server::cli {
 
 // The body of an answer that is a success. Throws std::runtime_error saying what the station refused.
 nlohmann::json asked(StationAnswer answer);
+
+using AskStation =
+    std::function<StationAnswer(const std::string& method, const std::string& target, const nlohmann::json& body)>;
 
 // How a tool that waits deals with a station whose places are all taken (503 `busy`): it asks again after a pause, but
 // gives up when every answer of the last minute was `busy`.

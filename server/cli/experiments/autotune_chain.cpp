@@ -55,7 +55,8 @@ json fixed_request(const AutotuneRequest& request) {
 }
 
 AutotuneChain::AutotuneChain(AskStation ask, AutotuneRequest request, AutotuneState& state, std::ostream& progress)
-    : station_{std::move(ask), [this](const json& now) { show(now); }},
+    : ask_{std::move(ask)},
+      station_{ask_, [this](const json& now) { show(now); }},
       request_{std::move(request)},
       state_{state},
       progress_{progress} {}
@@ -299,7 +300,7 @@ bool AutotuneChain::send_model() {
     return true;
   }
   say(fmt::format("robot model: to {}", request_.robot_id));
-  const json now = station_.model_sent_to(request_.robot_id, {{"fluid", run.at("fluid")}, {"model", robot_model()}});
+  const json now = model_sent_to(ask_, request_.robot_id, {{"fluid", run.at("fluid")}, {"model", robot_model()}});
   const std::string state = now.at("state").get<std::string>(), reason = now.value("reason", "");
   if (!model_has_arrived(now)) return stop(kRobotModel, fmt::format("{}: {}", state, reason));
   state_.finish(kRobotModel, {{"state", state}, {"reason", reason}, {"fluid", run.at("fluid")}});

@@ -82,6 +82,7 @@ class AutotuneChain {
   bool stop(const std::string& stage, const std::string& why);  // false
   void show(const nlohmann::json& job_or_experiment);
 
+  AskStation ask_;
   StationWork station_;
   AutotuneRequest request_;
   AutotuneState& state_;

@@ -17,7 +17,6 @@ using nlohmann::json;
 namespace {
 
 constexpr int kFirstProblem = 300, kTakenOver = 409;
-constexpr int kModelLooks = 37'000 / kLookMs;  // the station answers after 3 s, and tries for 30 s
 constexpr std::string_view kEndedExperiment[] = {"done", "aborted", "cancelled", "interrupted"};
 
 bool has_ended(const json& experiment) {
@@ -54,18 +53,6 @@ json StationWork::finished_job(std::int64_t job_id) const {
     on_look_(*job);
     if (!job->at("ended_at_us").is_null()) return std::move(*job);
   }
-}
-
-json StationWork::model_sent_to(const std::string& robot_id, const json& body) const {
-  const std::string robot = "/api/v1/robots/" + robot_id;
-  json now = post(robot + "/model", body).at("model");
-  BusyWait busy{busy_rule_};
-  for (int looks = 0; now.at("state") == "sending" && looks < kModelLooks; ++looks) {
-    busy.pause();
-    StationAnswer answer = ask_("GET", robot, nullptr);
-    if (!busy.is_busy(answer)) now = body_of(std::move(answer)).at("model");
-  }
-  return now;
 }
 
 void StationWork::resume_what_was_left(std::int64_t experiment_id) const {

@@ -19,9 +19,6 @@ inline constexpr int kLookMs = 50;  // signs of life are needed every 150 ms
 // The pause after a busy answer is no longer than a look, for signs of life go on.
 inline constexpr BusyRule kBusyBetweenLooks{.pause = std::chrono::milliseconds{kLookMs}};
 
-using AskStation =
-    std::function<StationAnswer(const std::string& method, const std::string& target, const nlohmann::json& body)>;
-
 // Reports what a job or an experiment says of itself, at each look.
 using OnLook = std::function<void(const nlohmann::json& job_or_experiment)>;
 
@@ -38,9 +35,6 @@ class StationWork {
   // As the station answers it, ended: a job with its result, an experiment with its runs.
   nlohmann::json finished_job(std::int64_t job_id) const;
   nlohmann::json finished_experiment(std::int64_t experiment_id) const;
-  // Sends a robot a model, and returns what has become of it (the member `model` of the robot's document), after 40 s
-  // at most.
-  nlohmann::json model_sent_to(const std::string& robot_id, const nlohmann::json& body) const;
   // An experiment that waits and is held, since its client was away or the station has restarted, is resumed; any other
   // is left as it is.
   void resume_what_was_left(std::int64_t experiment_id) const;
