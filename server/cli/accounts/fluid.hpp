@@ -30,8 +30,8 @@ void add_options(CLI::App& command, FluidCommand& options);
 // A model as the API takes it, from a file ("-": standard input). Throws
 // std::runtime_error for what is no JSON object.
 nlohmann::json model_in_file(const std::filesystem::path& file, const std::string& confirm_because);
-// Sends a robot a model (the body of POST …/model), and returns what has become of it, the member `model` of the robot's
-// document, after 40 s at most. Throws std::runtime_error saying what the station refused.
+// Sends a robot a model (the body of POST …/model), and returns what has become of it, the member `model` of the
+// robot's document, after 40 s at most. Throws std::runtime_error saying what the station refused.
 nlohmann::json model_sent_to(const AskStation& ask, const std::string& robot_id, const nlohmann::json& body);
 // Whether the robot holds the model that was sent, confirmed or assumed, by the member `model` of its document. An
 // assumed model has a fit error only if the station has sent it.

@@ -272,7 +272,8 @@ std::string AutotuneChain::why_not_sent(const json& run, const json& estimator) 
     return fmt::format("run {} is of another robot, {}", run.at("run_id").dump(), run.at("robot_id").dump());
   }
   const json fluid = station_.get("/api/v1/robots/" + request_.robot_id).at("fluid");
-  if (run.at("fluid") == fluid && fluid.is_string() && fluid != "") return "";
+  const std::string named = fluid.is_string() ? fluid.get<std::string>() : "";
+  if (!named.empty() && run.at("fluid") == named) return "";
   return fmt::format(
       "run {} was recorded in the fluid {}, and the robot is in {} (rheonaut robot fluid {} --set FLUID "
       "says which, before the run)",
