@@ -5,7 +5,7 @@
 namespace server::analysis {
 
 inline constexpr double kLowestCrossover_rad_s = 1e-3, kHighestCrossover_rad_s = 1e4;
-inline constexpr double kSmallestMargin_deg = 0.1, kLargestMargin_deg = 179.9;
+inline constexpr double kSmallestMarginDeg = 0.1, kLargestMarginDeg = 179.9;
 inline constexpr double kLowestMu = 0.01, kHighestMu = 1.99;
 inline constexpr double kLongestPeriod_s = 1;  // of the robot's controller
 

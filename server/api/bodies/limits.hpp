@@ -44,7 +44,7 @@ inline constexpr std::size_t kMaxLongWordBytes = 4000;
 inline constexpr std::size_t kMaxDocumentBytes = 16'384;  // of a fluid's model: its texts and plant together
 
 inline constexpr Range<double> kCrossovers_rad_s{analysis::kLowestCrossover_rad_s, analysis::kHighestCrossover_rad_s};
-inline constexpr Range<double> kMargins_deg{analysis::kSmallestMargin_deg, analysis::kLargestMargin_deg};
+inline constexpr Range<double> kMarginsDeg{analysis::kSmallestMarginDeg, analysis::kLargestMarginDeg};
 inline constexpr Range<double> kMus{analysis::kLowestMu, analysis::kHighestMu};
 
 inline constexpr Limit<std::size_t> kTextLimits[] = {
@@ -187,13 +187,13 @@ inline constexpr Limit<double> kNumberLimits[] = {
     {"TuneJobBody.duty_min", {-1, 0}},
     {"TuneJobBody.mu", kMus},
     {"TuneJobBody.period_s", {0.001, analysis::kLongestPeriod_s}},
-    {"TuneJobBody.phase_margin_deg", kMargins_deg},
+    {"TuneJobBody.phase_margin_deg", kMarginsDeg},
     {"TuneMeasuredJobBody.crossover_rad_s", kCrossovers_rad_s},
     {"TuneMeasuredJobBody.duty_max", {0.01, 1}},
     {"TuneMeasuredJobBody.duty_min", {-1, 0}},
     {"TuneMeasuredJobBody.mu", kMus},
     {"TuneMeasuredJobBody.period_s", {0.001, analysis::kLongestPeriod_s}},
-    {"TuneMeasuredJobBody.phase_margin_deg", kMargins_deg},
+    {"TuneMeasuredJobBody.phase_margin_deg", kMarginsDeg},
     {"TuningMapJobBody.from_rad_s", kCrossovers_rad_s},
     {"TuningMapJobBody.to_rad_s", kCrossovers_rad_s},
 };

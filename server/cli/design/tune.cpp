@@ -167,7 +167,7 @@ CLI::Option* add_map_options(CLI::App& command, Tune& options) {
 
 CLI::Validator crossovers() { return from_to(analysis::kLowestCrossover_rad_s, analysis::kHighestCrossover_rad_s); }
 
-CLI::Validator margins() { return from_to(analysis::kSmallestMargin_deg, analysis::kLargestMargin_deg); }
+CLI::Validator margins() { return from_to(analysis::kSmallestMarginDeg, analysis::kLargestMarginDeg); }
 
 CLI::Validator mus() { return from_to(analysis::kLowestMu, analysis::kHighestMu); }
 
