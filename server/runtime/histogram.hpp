@@ -19,24 +19,24 @@ inline constexpr std::array<std::int64_t, 14> kTimeBoundsUs{
 // Waiting entries of a queue; the recorder's is full at 2,000,000 samples.
 inline constexpr std::array<std::int64_t, 6> kDepthBounds{10, 100, 1'000, 10'000, 100'000, 1'000'000};
 
-template <const auto& Bounds>
+template <const auto& bounds>
 class Histogram {
  public:
-  static constexpr auto& kBounds = Bounds;
+  static constexpr auto& kBounds = bounds;
 
   void add(std::int64_t value) {
     const std::int64_t counted = std::max<std::int64_t>(value, 0);
-    const auto bound = std::ranges::lower_bound(Bounds, counted);
-    ++counts_[static_cast<std::size_t>(bound - Bounds.begin())];
+    const auto bound = std::ranges::lower_bound(bounds, counted);
+    ++counts_[static_cast<std::size_t>(bound - bounds.begin())];
     sum_ += counted;
   }
 
   // Of values up to kBounds[i] and above the bound before it; the last one of those above all.
-  const std::array<std::uint64_t, Bounds.size() + 1>& counts() const { return counts_; }
+  const std::array<std::uint64_t, bounds.size() + 1>& counts() const { return counts_; }
   std::int64_t sum() const { return sum_; }
 
  private:
-  std::array<std::uint64_t, Bounds.size() + 1> counts_{};
+  std::array<std::uint64_t, bounds.size() + 1> counts_{};
   std::int64_t sum_ = 0;
 };
 

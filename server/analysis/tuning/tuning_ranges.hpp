@@ -1,4 +1,4 @@
-// What a specification of a tuning may ask for, on the command line and of a job: beyond it are no robots, and to find
+// Ranges of a tuning's specification, on the command line and of a job: beyond them are no robots, and a search for
 // what is near may take minutes.
 #pragma once
 

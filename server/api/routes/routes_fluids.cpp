@@ -49,7 +49,7 @@ Result<std::string> parse_fluid(const std::string& text, const config::Envelope&
   return envelope.listed(*fluid);
 }
 
-// What has become of the model on the robot, when that is known in time.
+// The state of the model on the robot, after it was sent or when the patience has ended.
 boost::asio::awaitable<json> model_sent(FluidRoutes parts, std::string id) {
   const std::int64_t deadline_us = parts.clock.steady_us() + kSendingPatience.count();
   while (parts.station.find(id)->model.state == station::ModelState::sending && parts.clock.steady_us() < deadline_us) {

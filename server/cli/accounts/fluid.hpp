@@ -36,7 +36,7 @@ nlohmann::json model_sent_to(const AskStation& ask, const std::string& robot_id,
 // Whether the robot holds the model that was sent, confirmed or assumed, by the member `model` of its document. An
 // assumed model has a fit error only if the station has sent it.
 bool model_has_arrived(const nlohmann::json& model);
-// Of the API; a name of the list may have any character.
+// The path of the API for the model of this fluid, whose name may have any character.
 std::string path_of_fluid_model(const std::string& fluid);
 
 // Asks the station that runs in the folder. Throws std::runtime_error saying why nothing was changed.

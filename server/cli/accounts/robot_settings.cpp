@@ -215,7 +215,7 @@ int set_fluid(const Robot& robot, const RobotSettingsCommand& options, std::ostr
   return print_fluid(robot.post("/fluid", {{"fluid", fluid}}), options.json, out);
 }
 
-// Who sends a model names its fluid: the one that the robot is in may be another.
+// The person names the fluid of the model: the robot may be in another one.
 int send_model(const Robot& robot, const RobotSettingsCommand& options, std::ostream& out) {
   const json sent = model_in_file(options.model, options.confirm_because);
   const json fluid = robot.post("/fluid", {{"fluid", options.set}}).at("fluid");

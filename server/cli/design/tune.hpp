@@ -25,7 +25,7 @@ struct Tune {
 
 void add_options(CLI::App& command, Tune& options);
 
-// Of a specification, for CLI::Option::check: what the API takes, too.
+// Ranges of a specification, as the API takes them, for CLI::Option::check.
 CLI::Validator crossovers();  // rad/s
 CLI::Validator margins();     // degrees
 CLI::Validator mus();

@@ -1,4 +1,4 @@
-// What somebody has said of the fluid of a robot, and the model that the robot is to have for it.
+// The fluid that somebody has named for a robot, and the model that the robot is to have for it.
 #pragma once
 
 #include <cstdint>
