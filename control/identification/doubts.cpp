@@ -77,6 +77,9 @@ std::string in_words(const Doubt& doubt) {
       return doubt.value ? "the age of the readings hides a part of the dead time: one sigma of it is " +
                                rounded(1e3 * value, 2) + " ms"
                          : "the dead time is not determined: it lies at the limit of the search";
+    case DoubtCode::dead_zone:
+      return "the motor stands still below a duty of about " + rounded(value, 2) +
+             ", which the model does not hold: set the robot's dead_zone_duty";
     case DoubtCode::part_of_run_used: return "the fit used " + rounded(100 * value, 2) + " % of the run";
   }
   return "a doubt that this version does not know";

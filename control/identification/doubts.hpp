@@ -35,6 +35,7 @@ enum class DoubtCode {
   parameter_at_bound,              // value: the parameter
   part_of_run_used,                // value: the share of the run's time that the fit used
   dead_time_not_determined,        // value: its sd in s, beside what the fit says; none: at the limit of the search
+  dead_zone,                       // value: the duty below which the motor stands still, which no model holds
   sensor_unlike_data_sheet,        // value: how many sds of (1) or (3) of sensor_prior.hpp; parameter: of SensorFit
 };
 

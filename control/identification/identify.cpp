@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <iterator>
 #include <map>
+#include <utility>
 
 #include "control/identification/fit_summary.hpp"
 #include "control/identification/identifiability.hpp"
@@ -46,6 +47,7 @@ Identification identified(const Recording& recording, const IdentificationOption
   result.best = result.compared.front();
   result.amplitude = amplitude_evidence(search, recording, result.best, points[result.best.structure]);
   result.input = input_evidence(search, recording, result.best, points[result.best.structure]);
+  result.dead_zone = dead_zone_evidence(search, recording, result.best, points[result.best.structure]);
   std::vector<std::string>& warnings = result.warnings;
   const auto add = [&](std::vector<std::string> more) { std::ranges::move(more, std::back_inserter(warnings)); };
   add(unit_doubts(recording));
@@ -74,9 +76,10 @@ Identification out_of_time() {
   return none;
 }
 
-Identification identify(const Recording& recording, const IdentificationOptions& options) {
-  check_recording(recording);
-  check_options(options, recording);
+namespace {
+
+// Without a dead time that nobody named, or with it where the record asks for one and is explained better.
+Identification with_own_dead_time(const Recording& recording, const IdentificationOptions& options) {
   const double deadline_s = steady_now_s() + options.time_limit_s;
   Identification found = identified(recording, options);
   if (!asks_for_dead_time(recording, options, found.best, found.amplitude, found.input)) return found;
@@ -86,6 +89,34 @@ Identification identify(const Recording& recording, const IdentificationOptions&
   if (!is_explained_better(late.best, found.best, by_acceleration)) return found;
   if (!by_acceleration) late.warnings.push_back(dead_time_in_words(late.best, recording.dt_s));
   return late;
+}
+
+// The same record by what the motor made of the duty; taken if that leaves less, and no amplitude.
+bool is_better_beyond(const Identification& beyond, const Identification& all) {
+  const bool has_converged = beyond.best.end == SearchEnd::converged || beyond.best.end == SearchEnd::iteration_limit;
+  return has_converged && beyond.best.residual_sd < all.best.residual_sd && !changes_with_amplitude(beyond.amplitude);
+}
+
+}  // namespace
+
+Identification identify(const Recording& recording, const IdentificationOptions& options) {
+  check_recording(recording);
+  check_options(options, recording);
+  const double deadline_s = steady_now_s() + options.time_limit_s;
+  Identification found = with_own_dead_time(recording, options);
+  if (!found.dead_zone) return found;
+  const DeadZone zone = *std::exchange(found.dead_zone, std::nullopt);
+  Recording driven = recording;
+  driven.duty = beyond_dead_zone(std::move(driven.duty), zone);
+  IdentificationOptions in_time = options;
+  in_time.time_limit_s = deadline_s - steady_now_s();
+  Identification beyond = with_own_dead_time(driven, in_time);
+  if (beyond.best.end == SearchEnd::time_limit) return beyond;
+  if (!is_better_beyond(beyond, found)) return found;
+  beyond.dead_zone = zone;
+  beyond.doubts.push_back({DoubtCode::dead_zone, (zone.from_duty + zone.to_duty) / 2});
+  beyond.warnings.push_back(dead_zone_in_words(zone));
+  return beyond;
 }
 
 Fit evaluate(const FractionalModel& model, const Recording& recording, const IdentificationOptions& options) {

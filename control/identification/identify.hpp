@@ -37,6 +37,7 @@
 
 #include "control/identification/doubts.hpp"
 #include "control/identification/planned_experiment.hpp"
+#include "control/identification/score_doubts.hpp"
 #include "control/search/fit.hpp"
 
 namespace control {
@@ -58,6 +59,7 @@ struct Identification {
   Fit best;
   std::vector<Fit> compared;  // one per structure: the best, then by AIC; unfinished and untried ones last
   std::optional<ScoreEvidence> amplitude, input;  // of the best; none: nothing to compare
+  std::optional<DeadZone> dead_zone;              // of the motor, where the fit is without the duties below it
   std::vector<std::string> warnings;              // in words, with numbers and what to do
   std::vector<Doubt> doubts;                      // those of them that its uses count
   std::vector<JointRun> runs;                     // of several recordings, in their order; empty: there was one

@@ -23,7 +23,10 @@ constexpr double kFewestPerDirection = 10;     // values, so that this F is no c
 constexpr double kFitOfRounding = 100 - 1e-6;  // percent
 constexpr double kWindowS = 1;                 // a clock that is off by 0.5 % drifts by half a sample
 constexpr Index kMostWindows = 60;
-constexpr double kShortestLag = 2;   // samples
+constexpr double kShortestLag = 2;  // samples
+constexpr double kSameDuty = 1e-4;
+constexpr std::size_t kMostDeadZones = 40;
+constexpr double kLeastOfDeadZone = 0.5, kMostOfDeadZone = 2;  // c of (5)
 constexpr double kDependent = 1e-3;  // of a direction, what others cannot make of it, relative
 
 // Columns of all channels, one below the other, in units of the channel's residual.
@@ -183,6 +186,23 @@ std::optional<Explained> explained_by(const Residuals& residuals, const MatrixXd
                    .colour = samples_per_independent_one(rest)};
 }
 
+// Between the magnitudes of the duty, where they are few; else a grid up to half of the largest.
+std::vector<DeadZone> possible_dead_zones(const std::vector<double>& duty) {
+  std::vector<double> levels;
+  for (const double value : duty) levels.push_back(std::abs(value));
+  std::ranges::sort(levels);
+  const auto is_same = [](double a, double b) { return b - a < kSameDuty; };
+  levels.erase(std::unique(levels.begin(), levels.end(), is_same), levels.end());
+  if (levels.size() > kMostDeadZones) {
+    const double step = levels.back() / (2 * kMostDeadZones);
+    levels.clear();
+    for (std::size_t i = 0; i <= kMostDeadZones; ++i) levels.push_back(static_cast<double>(i) * step);
+  }
+  std::vector<DeadZone> zones;
+  for (std::size_t i = 2; i < levels.size(); ++i) zones.push_back({levels[i - 1], levels[i]});
+  return zones;
+}
+
 double widening_by(double share, const Residuals& residuals, const Fit& fit) {
   return std::sqrt(1 + share * static_cast<double>(residuals.values) / std::max(1, fit.free_parameters));
 }
@@ -221,6 +241,41 @@ std::optional<ScoreEvidence> input_evidence(OutputErrorSearch& search, const Rec
                        widening_by(std::max(0.0, found->share - by_chance), *residuals, fit)};
 }
 
+std::vector<double> beyond_dead_zone(std::vector<double> duty, const DeadZone& zone) {
+  const double end = (zone.from_duty + zone.to_duty) / 2;
+  for (double& value : duty) value = std::abs(value) < end ? 0 : value;
+  return duty;
+}
+
+std::optional<DeadZone> dead_zone_evidence(OutputErrorSearch& search, const Recording& recording, const Fit& fit,
+                                           const SearchPoint& point) {
+  const auto residuals = residuals_of(search, fit, point);
+  if (!residuals) return std::nullopt;
+  const MatrixXd own = side_by_side(own_and_disturbed(search, recording, Structure::fractional, point, residuals->sd));
+  if (!own.allFinite()) return std::nullopt;
+  const Qr by_own = directions(own, 1e-9);
+  const VectorXd left = beyond(by_own, residuals->column);
+  const double freedom = static_cast<double>(residuals->values - by_own.rank() - 1);
+  double most = kDoubtfulShare;
+  std::optional<DeadZone> found;
+  for (const DeadZone& zone : possible_dead_zones(recording.duty)) {
+    std::vector<double> below = recording.duty;
+    const std::vector<double> driven = beyond_dead_zone(recording.duty, zone);
+    for (std::size_t k = 0; k < below.size(); ++k) below[k] -= driven[k];
+    const MatrixXd slopes = stacked(search.model_slopes(below, point), residuals->sd);
+    if (!slopes.allFinite()) continue;
+    const VectorXd missing = beyond(by_own, slopes.leftCols(1));  // by ln kp: the output itself
+    const double square = missing.squaredNorm();
+    if (!(square > kDependent * kDependent * slopes.col(0).squaredNorm())) continue;
+    const double c = -missing.dot(left) / square, share = c * c * square / left.squaredNorm();
+    const double f = share / std::max(1e-12, 1 - share) * freedom;
+    if (share < most || f < kDoubtfulF || c < kLeastOfDeadZone || c > kMostOfDeadZone) continue;
+    most = share;
+    found = zone;
+  }
+  return found;
+}
+
 bool changes_with_amplitude(const std::optional<ScoreEvidence>& evidence) {
   return evidence && evidence->f > kDoubtfulF && evidence->share >= kDoubtfulShare;
 }
@@ -230,6 +285,14 @@ bool follows_input(const std::optional<ScoreEvidence>& evidence) {
 }
 
 bool may_lack_dead_time(const std::optional<ScoreEvidence>& input) { return input && input->f > kSearchedInputF; }
+
+std::string dead_zone_in_words(const DeadZone& zone) {
+  std::ostringstream text;
+  text.precision(3);
+  text << "the motor stands still below a duty between " << zone.from_duty << " and " << zone.to_duty
+       << ": the fit takes the duties below for 0; set the robot's dead_zone_duty, which the model does not hold";
+  return text.str();
+}
 
 std::vector<std::string> amplitude_doubts(const std::optional<ScoreEvidence>& evidence, const Recording& recording,
                                           bool order_is_forced, const std::string& structure_option) {

@@ -49,7 +49,7 @@ std::string doubts_in_words(const ModelDoubts& known);
 // said.
 std::string doubts_about_model(const nlohmann::json& design);
 
-// The grave ones in one line; empty: none is.
+// The grave ones in one line; of a fit whose doubts are not known that they are not; empty: none is.
 std::string grave_doubts_in_words(const ModelDoubts& known);
 
 const char* text(control::Structure value);

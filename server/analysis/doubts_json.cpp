@@ -17,6 +17,7 @@ namespace {
 
 constexpr std::size_t kMostDoubts = 32;
 constexpr double kNoticeable = 1.05;  // widening
+constexpr const char* kNotKnown = "an earlier version has made this fit: what is in doubt about it is not known";
 constexpr std::array kCodes{DoubtCode::search_not_converged,
                             DoubtCode::no_linear_model_over_amplitude,
                             DoubtCode::runs_disagree,
@@ -27,7 +28,8 @@ constexpr std::array kCodes{DoubtCode::search_not_converged,
                             DoubtCode::part_of_run_used,
                             DoubtCode::dead_time_not_determined,
                             DoubtCode::correlated_with_input,
-                            DoubtCode::sensor_unlike_data_sheet};
+                            DoubtCode::sensor_unlike_data_sheet,
+                            DoubtCode::dead_zone};
 
 std::optional<double> number_or_none(const json& value) {
   return value.is_null() ? std::nullopt : std::optional{value.get<double>()};
@@ -64,6 +66,7 @@ const char* text(DoubtCode value) {
     case DoubtCode::dead_time_not_determined: return "dead_time_not_determined";
     case DoubtCode::correlated_with_input: return "correlated_with_input";
     case DoubtCode::sensor_unlike_data_sheet: return "sensor_unlike_data_sheet";
+    case DoubtCode::dead_zone: return "dead_zone";
   }
   return "unknown";
 }
@@ -82,7 +85,8 @@ OrderedJson json_of(std::span<const Doubt> doubts) {
 
 Result<ModelDoubts> doubts_from(const json& fit) {
   ModelDoubts known;
-  known.is_of_fit = fit.is_object() && fit.contains("one_sigma");
+  const bool are_unknown = fit.is_object() && fit.contains("doubts") && fit.at("doubts").is_null();
+  known.is_of_fit = fit.is_object() && (fit.contains("one_sigma") || are_unknown);
   if (!fit.is_object() || !fit.contains("doubts") || fit.at("doubts").is_null()) return known;
   const json& list = fit.at("doubts");
   const auto wrong = [](const std::string& what) {
@@ -108,11 +112,10 @@ Result<ModelDoubts> doubts_from(const json& fit) {
 }
 
 std::string doubts_in_words(const ModelDoubts& known) {
-  if (!known.are_known) {
-    return known.is_of_fit ? "an earlier version has made this fit: what is in doubt about it is not known" : "";
-  }
+  if (!known.are_known) return known.is_of_fit ? kNotKnown : "";
   const auto matters = [](const Doubt& doubt) {
-    return !doubt.widening || *doubt.widening > kNoticeable || doubt.code == DoubtCode::dead_time_not_determined;
+    return !doubt.widening || *doubt.widening > kNoticeable || doubt.code == DoubtCode::dead_time_not_determined ||
+           doubt.code == DoubtCode::dead_zone;
   };
   std::vector<std::string> words = words_of(known, matters);
   if (words.empty()) return {};
@@ -134,6 +137,7 @@ std::string doubts_about_model(const json& design) {
 }
 
 std::string grave_doubts_in_words(const ModelDoubts& known) {
+  if (!known.are_known && known.is_of_fit) return kNotKnown;
   return fmt::format("{}", fmt::join(words_of(known, control::is_grave), "; "));
 }
 

@@ -53,6 +53,60 @@ Result<void> check_limits(const Profile& profile, const config::Envelope& envelo
   return {};
 }
 
+Demands demands_of(const Profile& profile) {
+  Demands demands;
+  const bool goes_back = profile.until && profile.conditions.start == StartPosition::back;
+  demands.longest_auto_s = goes_back ? kWayBack_s : profile.until ? 0 : longest_auto_s(profile);
+  for (const Variant& variant : variants_of(profile)) {
+    if (variant.repeat > 1) continue;
+    const TimeLine line = time_line_of(profile, variant);
+    for (const Action& action : line.actions) {
+      const std::size_t step = variant.step > 0 ? variant.step : action.step + 1;
+      if (action.kind == ActionKind::duty && action.value < demands.duty_min) {
+        demands.duty_min = action.value;
+        demands.duty_step = step;
+      }
+      if (action.kind != ActionKind::setpoint) continue;
+      if (action.value < demands.setpoint_min_m) {
+        demands.setpoint_min_m = action.value;
+        demands.setpoint_min_step = step;
+      }
+      if (action.value > demands.setpoint_max_m) {
+        demands.setpoint_max_m = action.value;
+        demands.setpoint_max_step = step;
+      }
+    }
+  }
+  return demands;
+}
+
+Result<void> check_demands(const Demands& demands, const RobotLimits& limits) {
+  if (demands.longest_auto_s > limits.auto_limit_s) {
+    return fail(ErrorCode::invalid,
+                fmt::format("the profile stays in auto for {:.1f} s; the robot's auto_limit_s is {} s",
+                            demands.longest_auto_s, limits.auto_limit_s),
+                "auto_limit");
+  }
+  if (demands.duty_min < 0 && !limits.has_reverse) {
+    return fail(
+        ErrorCode::invalid,
+        fmt::format("step {}: duty = {:.3g}, and the robot's motor has no reverse (its controller has duty_min "
+                    "= 0): take a profile whose duties are not below 0, such as identification_one_way, or send "
+                    "a controller with reverse first",
+                    demands.duty_step, demands.duty_min),
+        "out_of_range");
+  }
+  const bool is_too_low = static_cast<float>(demands.setpoint_min_m) < limits.setpoint_min_m;  // as the robot compares
+  if (!is_too_low && static_cast<float>(demands.setpoint_max_m) <= limits.setpoint_max_m) return {};
+  return fail(ErrorCode::invalid,
+              fmt::format("step {}: setpoint_m = {:.6g} is outside {:.6g} to {:.6g} m, the limits of the robot "
+                          "(setpoint_limit_m, position_limit_min_m, position_limit_max_m)",
+                          is_too_low ? demands.setpoint_min_step : demands.setpoint_max_step,
+                          is_too_low ? demands.setpoint_min_m : demands.setpoint_max_m, limits.setpoint_min_m,
+                          limits.setpoint_max_m),
+              "out_of_range");
+}
+
 double longest_auto_s(const Profile& profile) {
   std::uint64_t longest = 0;
   for (const Variant& variant : variants_of(profile)) {

@@ -1,5 +1,5 @@
 // Prints how often identification says that the parameters change with amplitude, or that the residuals follow the
-// duty: amplitude_study [SEEDS [FIRST]].
+// duty, and how often it names a dead zone, of motors that have none: amplitude_study [SEEDS [FIRST]].
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
@@ -34,7 +34,7 @@ std::vector<double> duty_of(Drive drive, std::uint64_t seed) {
 }
 
 struct Row {
-  int doubts = 0, compared = 0, follow = 0;
+  int doubts = 0, compared = 0, follow = 0, dead_zones = 0;
   double most_input_share = 0, most_input_f = 0;
   double least_share = 1, most_share = 0, least_f = 1e300, most_f = 0;
 };
@@ -49,6 +49,7 @@ void add(const control::Recording& recording, Row& row) {
   };
   row.doubts += says("the parameters change with amplitude") ? 1 : 0;
   row.follow += says("the residuals follow the duty") ? 1 : 0;
+  row.dead_zones += found.dead_zone ? 1 : 0;
   if (found.input) {
     row.most_input_share = std::max(row.most_input_share, found.input->share);
     row.most_input_f = std::max(row.most_input_f, found.input->f);
@@ -62,10 +63,10 @@ void add(const control::Recording& recording, Row& row) {
 }
 
 void print(const Fluid& fluid, const char* fitted, Drive drive, const Row& row, int seeds) {
-  std::printf("| %s | %s | %s | %d of %d | %.1f to %.1f %% | %.1f to %.1f | %d | up to %.1f %% | up to %.1f |\n",
+  std::printf("| %s | %s | %s | %d of %d | %.1f to %.1f %% | %.1f to %.1f | %d | up to %.1f %% | up to %.1f | %d |\n",
               fluid.name.c_str(), fitted, kDriveNames[static_cast<int>(drive)], row.doubts, seeds,
               100 * row.least_share, 100 * row.most_share, row.least_f, row.most_f, row.follow,
-              100 * row.most_input_share, row.most_input_f);
+              100 * row.most_input_share, row.most_input_f, row.dead_zones);
   if (row.compared < seeds) std::printf("(%d of them compared)\n", row.compared);
   std::fflush(stdout);
 }
@@ -76,9 +77,10 @@ int main(int argc, char** argv) {
   const int seeds = argc > 1 ? std::atoi(argv[1]) : 20, first = argc > 2 ? std::atoi(argv[2]) : 1;
   if (seeds < 1 || first < 1) return std::fprintf(stderr, "amplitude_study: SEEDS and FIRST are positive numbers\n"), 2;
   std::printf(
-      "| fluid (%d seeds from %d) | fitted | duty | amplitude doubted | share | F | follows the duty | share | F |\n",
+      "| fluid (%d seeds from %d) | fitted | duty | amplitude doubted | share | F | follows the duty | share | F | "
+      "dead zone named |\n",
       seeds, first);
-  std::printf("|---|---|---|---|---|---|---|---|---|\n");
+  std::printf("|---|---|---|---|---|---|---|---|---|---|\n");
   for (const Fluid& fluid : fluids()) {
     for (const Drive drive : {Drive::steps, Drive::levels, Drive::binary}) {
       Row acceleration, position;

@@ -17,7 +17,6 @@
 namespace control {
 namespace {
 
-constexpr double kDegPerRad = 180 / std::numbers::pi;
 constexpr OpenLoop kPositionLoop{kNonNewtonianModel, kPaperController};
 constexpr OpenLoop kVelocityLoop{kNonNewtonianModel, kPaperController, true};
 constexpr OpenLoop kNewtonianLoop{kNewtonianModel, kPaperController};

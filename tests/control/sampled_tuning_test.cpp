@@ -2,17 +2,15 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <numbers>
 #include <stdexcept>
 
+#include "control/responses/frequency_response.hpp"
 #include "control/tuning/tune.hpp"
 
 namespace control {
 namespace {
 
 using testing::HasSubstr;
-
-constexpr double kDegPerRad = 180 / std::numbers::pi;
 
 TEST(SampledTuning, RefusesWhatIsUnstableAsTheRobotRunsIt) {
   TuningSpec spec{60, 15};

@@ -9,16 +9,16 @@
 #include <fstream>
 #include <limits>
 #include <nlohmann/json.hpp>
-#include <numbers>
 #include <random>
 #include <stdexcept>
+
+#include "control/responses/frequency_response.hpp"
 
 namespace control {
 namespace {
 
 using testing::HasSubstr;
 
-constexpr double kDegPerRad = 180 / std::numbers::pi;
 constexpr double kPrinted = 1e-6;  // relative, where the reference has 10 digits or more
 
 nlohmann::json golden() { return nlohmann::json::parse(std::ifstream(TEST_DATA_DIR "/tuning_solutions.json")); }

@@ -13,6 +13,7 @@ import processes
 from processes import BIN, commanded, lab, wait_until
 
 SOUND = '[electrode]\npreset = "ds550"\n'
+WITH_DEAD_ZONE = SOUND + "[motor]\ndead_zone_duty = 0.08\n"
 WRONG = """[motor]
 is_reversed = true
 [accelerometer]
@@ -69,10 +70,10 @@ class CommissionTest(unittest.TestCase):
         cls.place = cls.enterClassContext(lab())
         cls.station = cls.place.start_station()
         cls.robots = {robot: cls.start_robot(robot, scenario) for robot, scenario in
-                      (("sound", SOUND), ("wrong", WRONG), ("silent", SOUND), ("interrupted", SOUND), ("asked", SOUND), ("full", SOUND))}
+                      (("sound", WITH_DEAD_ZONE), ("wrong", WRONG), ("silent", SOUND), ("interrupted", SOUND), ("asked", SOUND), ("full", SOUND))}
         for name, value in (("position_limit_max_m", 0.3), ("position_limit_min_m", -0.3)):
             commanded(cls.station, "set_parameter", "sound", name=name, value=value, confirm=True)
-        cls.answers = {"sound": ANSWERS, "wrong": ANSWERS | {"direction": "backwards"}}
+        cls.answers = {"sound": ANSWERS | {"set_dead_zone": "yes"}, "wrong": ANSWERS | {"direction": "backwards"}}
         cls.begun = {robot: begin(cls.place, robot, answers, 0) for robot, answers in cls.answers.items()}
 
     @classmethod
@@ -108,6 +109,10 @@ class CommissionTest(unittest.TestCase):
         self.assertLessEqual({verdicts[step] for step in busy}, {"pass", "attention"})
         gain = next(f["figures"]["gain_m_s"] for f in record["findings"] if f["step"] == "motor_constant")
         self.assertAlmostEqual(gain, 0.1, delta=0.015)  # of equation (29)
+        self.assertIn("dead_zone_duty was set to 0.080 and doubtful_duty to 0.100", found_in(record, "dead_zone"))
+        parameters = self.station.get("/api/v1/robots/sound/parameters")["parameters"]
+        values = {one["name"]: round(one["value"], 6) for one in parameters}
+        self.assertEqual((values["dead_zone_duty"], values["doubtful_duty"]), (0.08, 0.1))
         self.assertEqual((status, record["signed_by"], record["not_marked"]), (0, "Ann", None))
         self.assertIn("--yes", record["confirmed_by"])
         self.assertIn("direction", record["answers_given_beforehand"])

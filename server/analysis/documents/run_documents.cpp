@@ -48,6 +48,14 @@ DesignOfRun line_of(const storage::Design& design) {
           doubts_about_model(json::parse(design.made.document, nullptr, false))};
 }
 
+ControllerInReport line_of(const storage::ControllerOfRun& one) {
+  ControllerInReport line{one.controller.id, one.controller.made.name, one.controller.sha256, {}, {}};
+  if (!one.model) return line;
+  line.model = line_of(*one.model);
+  for (const storage::DesignSource& source : one.model->made.sources) line.model_runs.push_back(source.run);
+  return line;
+}
+
 }  // namespace
 
 asio::awaitable<Result<std::int64_t>> RunDocuments::reference_time(storage::RunId run) {
@@ -132,12 +140,14 @@ asio::awaitable<Result<std::string>> RunDocuments::report(storage::RunId id, std
   report.metrics = json::parse(found->metrics.document, nullptr, false);
   add_position_doubts(report.metrics);
   const auto designs = co_await designs_of(id);
+  const auto made_with = co_await parts_.designs.controllers_of(id);
   report.sha256 = co_await sha256_of(id);
   report.audit = co_await audit_of(report.run);
   report.program = base::version();
   report.made_at_us = made_at_us.value_or(parts_.clock.utc_us());
-  auto write = [report = std::move(report), designs]() mutable {
+  auto write = [report = std::move(report), designs, made_with]() mutable {
     for (const storage::Design& design : designs) report.designs.push_back(line_of(design));
+    for (const storage::ControllerOfRun& one : made_with) report.made_with.push_back(line_of(one));
     return html_of(report);
   };
   co_return co_await parts_.analysis.compute(std::move(write));

@@ -69,6 +69,7 @@ json steps_over(std::span<const json> documents) {
     json step{{"cause", documents.front().at("steps").at(number).at("cause")}, {"measures", json::array()}};
     for (const json& document : documents) {
       step["position_source"].push_back(document.at("steps").at(number).at("position_source"));
+      step["position_doubt"].push_back(position_doubt(document.at("steps").at(number)));
     }
     for (const char* measure : kStepMeasures) {
       std::vector<std::optional<double>> values;
@@ -99,19 +100,6 @@ json differences(std::span<const storage::Run> runs) {
   look("parameters_checksum", [](const storage::Run& run) { return run.parameters_checksum; });
   look("firmware_version", [](const storage::Run& run) { return run.firmware_version; });
   return differing;
-}
-
-// A loop that settles by its estimate has settled in its own belief, and the band is as far as it may be trusted.
-std::string position_doubt(const json& step) {
-  const json& sd_m = step.at("position_sd_m");
-  const bool is_belief = step.at("position_source") == "estimate";
-  if (!sd_m.is_number()) return "how exact the position is, is not known: this shows the belief only";
-  constexpr double kMmPerM = 1e3;
-  const double within_mm = 2 * kMmPerM * sd_m.get<double>(), band_mm = kMmPerM * step.at("band_m").get<double>();
-  if (within_mm <= band_mm) return {};
-  const auto cell = [](double value) { return fmt::format("{:.{}f}", value, value < 10 ? 1 : 0); };
-  return fmt::format("± {} mm is {} times the band of {} mm: this shows {}", cell(within_mm), cell(within_mm / band_mm),
-                     cell(band_mm), is_belief ? "the belief only" : "no settling within it");
 }
 
 }  // namespace
@@ -157,6 +145,19 @@ void add_missed_ticks(json& metrics, const storage::Run& run) {
   json& figures = metrics["figures"];
   figures["missed_ticks"] = run.missed ? json(run.missed->count) : json(nullptr);
   figures["longest_missed_ticks"] = run.missed ? json(run.missed->longest) : json(nullptr);
+}
+
+// A loop that settles by its estimate has settled in its own belief, and the band is as far as it may be trusted.
+std::string position_doubt(const json& step) {
+  const json& sd_m = step.at("position_sd_m");
+  const bool is_belief = step.at("position_source") == "estimate";
+  if (!sd_m.is_number()) return "how exact the position is, is not known: this shows the belief only";
+  constexpr double kMmPerM = 1e3;
+  const double within_mm = 2 * kMmPerM * sd_m.get<double>(), band_mm = kMmPerM * step.at("band_m").get<double>();
+  if (within_mm <= band_mm) return {};
+  const auto cell = [](double value) { return fmt::format("{:.{}f}", value, value < 10 ? 1 : 0); };
+  return fmt::format("± {} mm is {} times the band of {} mm: this shows {}", cell(within_mm), cell(within_mm / band_mm),
+                     cell(band_mm), is_belief ? "the belief only" : "no settling within it");
 }
 
 void add_position_doubts(json& metrics) {

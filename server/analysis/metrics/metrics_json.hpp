@@ -21,9 +21,10 @@ nlohmann::json json_of(const RunMetrics& metrics);  // figures by name, steps, e
 // after the metrics were stored.
 void add_missed_ticks(nlohmann::json& metrics, const storage::Run& run);
 
-// Each step's `position_doubt`: why it does not tell where the robot was, in a sentence; empty: ± 2 sd of its position
-// are within the settling band.
-void add_position_doubts(nlohmann::json& metrics);
+// Why a step does not tell where the robot was, in a sentence; empty: ± 2 sd of its position are within the settling
+// band. Of a step as JSON, as above.
+std::string position_doubt(const nlohmann::json& step);
+void add_position_doubts(nlohmann::json& metrics);  // each step's `position_doubt`
 
 // Each figure, and each measure of each step, over the runs: values, mean, sd, confidence, repeatability limit. Steps
 // are those of every run with the same number and cause; `documents` are what json_of(RunMetrics) gives, one for each

@@ -208,6 +208,10 @@ std::string steps_section(const ComparisonReport& report) {
     if (number == 0) out = "<h2>Steps</h2>\n";
     out += fmt::format("<h3>Step {}: {}</h3>\n", ++number, html_escaped(step.at("cause")));
     out += measures_table(report, "Measure", step.at("measures"));
+    for (std::size_t i = 0; i < report.runs.size(); ++i) {
+      const auto doubt = step.at("position_doubt").at(i).get<std::string>();
+      if (!doubt.empty()) out += fmt::format("<p>Run {}: {}.</p>\n", report.runs[i].id, html_escaped(doubt));
+    }
   }
   if (number == 0) return out;
   return out +

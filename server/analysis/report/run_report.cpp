@@ -49,6 +49,31 @@ std::string conditions(const storage::Run& run) {
   return out;
 }
 
+std::string experiment_line(const storage::RunOrigin& origin, const std::string& profile) {
+  return fmt::format("<p>Run {} of experiment {}, profile “{}”, SHA-256 <code>{}</code>.</p>\n", origin.number,
+                     origin.experiment, html_escaped(profile), origin.profile_sha256);
+}
+
+// Nothing where neither an experiment nor a kept controller is known.
+std::string made_with(const RunReport& report) {
+  if (!report.run.origin && report.made_with.empty()) return {};
+  std::string out = "<h2>Made with</h2>\n";
+  if (report.run.origin) out += experiment_line(*report.run.origin, report.run.conditions.profile);
+  if (report.made_with.empty()) return out + "<p>No controller that the station keeps is known to be the run's.</p>\n";
+  out +=
+      "<table><tr><th>Controller</th><th>Designed for the model</th><th>Found from run</th>"
+      "<th>In doubt about the model</th></tr>\n";
+  for (const ControllerInReport& one : report.made_with) {
+    const auto& model = one.model;
+    out += fmt::format("<tr><td>{}: {}<br><code>{}</code></td><td>{}</td><td>{}</td><td>{}</td></tr>\n", one.number,
+                       html_escaped(one.name), one.sha256,
+                       model ? fmt::format("{}: {}", model->number, html_escaped(model->name)) : "not known",
+                       one.model_runs.empty() ? "not known" : fmt::format("{}", fmt::join(one.model_runs, ", ")),
+                       model ? html_escaped(model->doubts) : "");
+  }
+  return out + "</table>\n";
+}
+
 // A line of each sample, with a break where samples are missing.
 template <class Value>
 PlotLine line_of_trace(const RunReport& report, const std::vector<double>& times_s, Value value) {
@@ -259,8 +284,8 @@ std::string origin(const RunReport& report) {
 }  // namespace
 
 std::string html_of(const RunReport& report) {
-  return heading(report) + conditions(report.run) + plots(report) + interruptions(report) + steps(report.metrics) +
-         figures(report.metrics) + designs(report) + origin(report) + page_end();
+  return heading(report) + conditions(report.run) + made_with(report) + plots(report) + interruptions(report) +
+         steps(report.metrics) + figures(report.metrics) + designs(report) + origin(report) + page_end();
 }
 
 }  // namespace server::analysis

@@ -1,5 +1,5 @@
-// A run as one HTML file: conditions, plots, metrics, what was designed from it, digest and audit. It loads nothing and
-// has no script.
+// A run as one HTML file: conditions, what it was made with, plots, metrics, what was designed from it, digest, audit.
+// It loads nothing and has no script.
 //
 // Everything that people or robots wrote is escaped. Pure and slow for long runs: call it on a worker.
 #pragma once
@@ -23,12 +23,21 @@ struct DesignOfRun {
   std::string doubts;  // about the model, in a line; empty: none, or nobody has said
 };
 
+// A controller that the run was made with, and the model that it was designed for.
+struct ControllerInReport {
+  std::int64_t number = 0;
+  std::string name, sha256;
+  std::optional<DesignOfRun> model;
+  std::vector<std::int64_t> model_runs;  // that the model was found from
+};
+
 struct RunReport {
   storage::Run run;
   std::vector<TracePoint> trace;
   std::optional<storage::StoredReference> reference;
-  nlohmann::json metrics;                  // as json_of(RunMetrics) gives them
-  std::vector<DesignOfRun> designs;        // newest first
+  nlohmann::json metrics;            // as json_of(RunMetrics) gives them
+  std::vector<DesignOfRun> designs;  // newest first
+  std::vector<ControllerInReport> made_with;
   std::string sha256;                      // of the run's certificate; empty: it has none yet
   std::vector<storage::AuditEntry> audit;  // of the run, newest first
   std::string program;                     // its version

@@ -40,6 +40,8 @@ struct RunPapers {
   storage::CurrentDigest digest;
   storage::RunSnapshot snapshot;
   std::vector<DesignWithAncestors> designs;
+  std::vector<storage::ControllerOfRun> made_with;
+  std::optional<storage::PerformedProfile> performed;
 };
 
 std::string pretty(const json& value) { return value.dump(2, ' ', false, json::error_handler_t::replace) + "\n"; }
@@ -50,14 +52,26 @@ json with_document(const storage::Design& design) {
   return out;
 }
 
-std::string designs_text(const std::vector<DesignWithAncestors>& designs) {
-  json list = json::array();
-  for (const DesignWithAncestors& one : designs) {
+std::string designs_text(const RunPapers& papers) {
+  json list = json::array(), made_with = json::array();
+  for (const DesignWithAncestors& one : papers.designs) {
     list.push_back(with_document(one.design));
     list.back()["ancestors"] = json::array();
     for (const storage::Design& ancestor : one.ancestors) list.back()["ancestors"].push_back(with_document(ancestor));
   }
-  return pretty({{"designs", std::move(list)}});
+  for (const storage::ControllerOfRun& one : papers.made_with) {
+    made_with.push_back(with_document(one.controller));
+    made_with.back()["model"] = one.model ? with_document(*one.model) : json(nullptr);
+  }
+  return pretty({{"designs", std::move(list)}, {"made_with", std::move(made_with)}});
+}
+
+std::string experiment_text(const storage::PerformedProfile& performed) {
+  return pretty({{"experiment_id", performed.origin.experiment},
+                 {"number", performed.origin.number},
+                 {"variant", json::parse(performed.variant, nullptr, false)},
+                 {"profile_sha256", performed.origin.profile_sha256},
+                 {"profile", performed.document}});
 }
 
 std::string metrics_text(const storage::StoredMetrics& metrics) {
@@ -70,14 +84,21 @@ std::string metrics_text(const storage::StoredMetrics& metrics) {
 // Slow for long runs: on a worker.
 std::vector<analysis::CapsuleDocument> documents_of(const RunPapers& papers) {
   const storage::Run& run = papers.run;
-  return {{"run.json", "Conditions and counts of the run", kJson, pretty(to_json(run))},
-          {"metrics.json", "Figures and steps of the run", kJson, metrics_text(papers.metrics)},
-          {"certificate.json", "Digest of the samples", kJson, pretty(to_json(papers.digest, run.id))},
-          {"configuration.json", "Controller, parameters and station configuration in force", kJson,
-           pretty(to_json(papers.snapshot))},
-          {"designs.json", "Models and controllers found from the run, with their ancestry", kJson,
-           designs_text(papers.designs)},
-          {"report.html", "Report with plots", "text/html", papers.report_html}};
+  std::vector<analysis::CapsuleDocument> documents{
+      {"run.json", "Conditions and counts of the run", kJson, pretty(to_json(run))},
+      {"metrics.json", "Figures and steps of the run", kJson, metrics_text(papers.metrics)},
+      {"certificate.json", "Digest of the samples", kJson, pretty(to_json(papers.digest, run.id))},
+      {"configuration.json", "Controller, parameters and station configuration in force", kJson,
+       pretty(to_json(papers.snapshot))},
+      {"designs.json",
+       "Models and controllers found from the run, with their ancestry, and those that it was made with", kJson,
+       designs_text(papers)},
+      {"report.html", "Report with plots", "text/html", papers.report_html}};
+  if (papers.performed) {
+    documents.push_back({"experiment.json", "Number of the run in its experiment, and the profile that was performed",
+                         kJson, experiment_text(*papers.performed)});
+  }
+  return documents;
 }
 
 asio::awaitable<std::vector<DesignWithAncestors>> designs_of(CapsuleRoutes parts, storage::RunId id) {
@@ -109,6 +130,8 @@ asio::awaitable<Result<RunPapers>> papers_of(CapsuleRoutes parts, storage::Run r
   if (!snapshot) co_return std::unexpected{snapshot.error()};
   papers.snapshot = std::move(*snapshot);
   papers.designs = co_await designs_of(parts, run.id);
+  papers.made_with = co_await parts.designs.controllers_of(run.id);
+  papers.performed = co_await parts.runs.performed_profile(run.id);
   papers.run = std::move(run);
   papers.run.missed = metrics->run.missed;  // as the metrics have it
   co_return papers;

@@ -107,6 +107,8 @@ http::Answer get_design(DesignRoutes parts, http::Request request) {
   out["ancestors"] = json::array();
   const auto ancestors = co_await parts.designs.ancestors(*id);
   for (const storage::Design& ancestor : ancestors) out["ancestors"].push_back(to_json(ancestor));
+  const auto made_with = co_await parts.designs.runs_made_with(*id);
+  out["runs_made_with"] = made_with;
   co_return http::json_response(200, out);
 }
 

@@ -1,10 +1,12 @@
-// A controller that is kept goes to a robot: sent as set_controller, read back, compared.
+// A controller that is kept goes to a robot: noted for the runs that are made with it, sent as set_controller, read
+// back, compared.
 #include <fmt/format.h>
 
 #include "base/json_text.hpp"
 #include "server/analysis/analysis_service.hpp"
 #include "server/analysis/tuning/controller_document.hpp"
 #include "server/api/analysis/analysis_routes.hpp"
+#include "server/api/bodies/controller_body.hpp"
 #include "server/api/bodies/json.hpp"
 #include "server/api/bodies/limits.hpp"
 #include "server/station/station.hpp"
@@ -49,6 +51,14 @@ http::Request command_request(http::Request request, json body, json controller)
   return request;
 }
 
+// As the command will send it; none: the command is refused, with the reason.
+std::optional<std::uint32_t> checksum_in(const std::string& command, const station::RobotSettings* known) {
+  const bool is_current = known != nullptr && known->is_controller_current && known->controller;
+  const auto controller =
+      controller_from(Members{json::parse(command, nullptr, false)}, is_current ? &*known->controller : nullptr);
+  return controller ? std::optional{controller->checksum} : std::nullopt;
+}
+
 http::Answer push_controller(PushRoutes parts, http::Request request) {
   const auto body = Members::parse(request.body, {"design_id", "duty_min", "duty_max", "derivative_on", "confirm",
                                                   "life_ms", "stamp_us", "issued_at_us"});
@@ -70,6 +80,10 @@ http::Answer push_controller(PushRoutes parts, http::Request request) {
     co_return http::problem(422, fmt::format("design {}: {}", *id, controller.error().detail), "no_controller");
   }
   http::Request command = command_request(std::move(request), body->object(), std::move(*controller));
+  if (const auto checksum = checksum_in(command.body, parts.commands.station.settings(robot_id))) {
+    const auto noted = co_await parts.designs.note_sent(*id, robot_id, *checksum);
+    if (!noted) co_return http::problem(noted.error());
+  }
   http::Response answered = co_await submit_command(parts.commands, std::move(command));
   if (answered.status != 200) co_return answered;
   const json record = json::parse(answered.body, nullptr, false);

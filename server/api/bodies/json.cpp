@@ -235,6 +235,12 @@ json to_json(const storage::Run& run) {
   out["samples_lost"] = run.samples_lost;
   out["missed_ticks"] = run.missed ? json(run.missed->count) : json(nullptr);
   out["longest_missed_ticks"] = run.missed ? json(run.missed->longest) : json(nullptr);
+  out["experiment"] = nullptr;
+  if (run.origin) {
+    out["experiment"] = {{"experiment_id", run.origin->experiment},
+                         {"number", run.origin->number},
+                         {"profile_sha256", run.origin->profile_sha256}};
+  }
   out["interrupted"] = json::array();
   for (const storage::InterruptedPart& part : run.interrupted) {
     out["interrupted"].push_back({{"span", part.span},

@@ -227,6 +227,8 @@ boost::asio::awaitable<Result<protocol::Controller>> controller_by_name(Controll
   // SAFETY: an experiment gives no controller more of the motor than the one in force has.
   const bool is_wider = controller->duty_min < in_force.duty_min || controller->duty_max > in_force.duty_max;
   if (is_wider) co_return fail(ErrorCode::forbidden, "its duty range is wider than that in force", "not_permitted");
+  const auto noted = co_await names.designs.note_sent(found->id, robot_id, controller->checksum);
+  if (!noted) co_return std::unexpected{noted.error()};
   co_return *controller;
 }
 

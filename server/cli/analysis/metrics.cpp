@@ -67,6 +67,10 @@ void write_comparison(const MetricsQuestion& options, const json& compared, std:
     fmt::print(out, "\nstep {}, {}, by the position {}:\n", ++number, step.at("cause").get<std::string>(),
                fmt::join(step.at("position_source").get<std::vector<std::string>>(), ", "));
     write_metric_rows(options, "measure", "never", step.at("measures"), out);
+    const auto doubts = step.value("position_doubt", std::vector<std::string>(options.runs.size()));
+    for (std::size_t i = 0; i < doubts.size(); ++i) {
+      if (!doubts[i].empty()) fmt::print(out, "run {}: {}\n", options.runs.at(i), doubts[i]);
+    }
   }
   const auto differing = compared.at("differing_conditions").get<std::vector<std::string>>();
   if (differing.empty()) return;

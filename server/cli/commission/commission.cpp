@@ -76,8 +76,9 @@ void add_options(CLI::App& command, Commission& options) {
       ->check(from_to(0.05, 0.5));
   command.add_option("--signed-by", options.signed_by, "Who signs the record (default: asked for)")->check(named());
   command
-      .add_option("--answers", options.answers,
-                  "JSON object with the answers: free_ahead_m, free_behind_m, direction, moved_m, signed_by")
+      .add_option(
+          "--answers", options.answers,
+          "JSON object with the answers: free_ahead_m, free_behind_m, direction, moved_m, set_dead_zone, signed_by")
       ->check(named());
   command.add_flag("--yes", options.says_yes, "Confirm every step beforehand: for a rehearsal on a simulated robot");
   add_json_flag(command, options.form);

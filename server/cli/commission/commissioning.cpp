@@ -227,7 +227,31 @@ void Commissioning::judge_pushes() {
   if (direction_.response.edges() > 0 && direction_.person != SeenByPerson::nothing && !direction_.response.is_seen()) {
     return add(not_done("dead_zone", "the accelerometer sees no motion: its axis comes first"));
   }
-  add(judge_dead_zone(dead_zone_));
+  const StepFinding found = judge_dead_zone(dead_zone_);
+  const auto zone = dead_zone_to_set(dead_zone_);
+  if (found.verdict != Verdict::attention || !zone) return add(found);
+  add(set_dead_zone(*zone, found));
+}
+
+// A duty between the two that were tried may move the robot or not: `doubtful_duty` says so to its estimator.
+StepFinding Commissioning::set_dead_zone(const DeadZoneToSet& zone, StepFinding found) {
+  const std::string answer = person_.text(
+      "set_dead_zone", fmt::format("The accelerometer saw nothing at a duty of {:.2f} and motion at {:.2f}. If the "
+                                   "propeller stood still there, type yes to set the robot's dead_zone_duty to {:.3f} "
+                                   "and doubtful_duty to {:.3f} (Enter: leave them)",
+                                   zone.still, zone.moving, zone.middle(), zone.moving));
+  if (answer != "yes") return found;
+  for (const auto& [name, value] : {std::pair{"dead_zone_duty", zone.middle()}, {"doubtful_duty", zone.moving}}) {
+    if (const std::string problem = robot_.set_parameter(name, value); !problem.empty()) {
+      found.found += fmt::format("; {} was not set: {}", name, problem);
+      return found;
+    }
+  }
+  dead_zone_.parameter = zone.middle();
+  StepFinding set = judge_dead_zone(dead_zone_);
+  set.found +=
+      fmt::format("; dead_zone_duty was set to {:.3f} and doubtful_duty to {:.3f}", zone.middle(), zone.moving);
+  return set;
 }
 
 void Commissioning::find_motor_constant() {

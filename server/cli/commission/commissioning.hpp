@@ -40,6 +40,7 @@ class Commissioning {
   void push();
   void find_direction();
   void judge_pushes();
+  StepFinding set_dead_zone(const DeadZoneToSet& zone, StepFinding found);
   void find_motor_constant();
   void judge_travel();
   void end_early(const std::string& why);

@@ -233,6 +233,15 @@ StepFinding judge_imu_axis(const DirectionFacts& facts) {
   return finding;
 }
 
+std::optional<DeadZoneToSet> dead_zone_to_set(const DeadZoneFacts& facts) {
+  const Bracket forwards = bracket_of(facts.responses, 1), backwards = bracket_of(facts.responses, -1);
+  if (!forwards.moving || (!facts.is_one_way && !backwards.moving)) return std::nullopt;
+  const DeadZoneToSet zone{std::max(forwards.still.value_or(0), facts.is_one_way ? 0 : backwards.still.value_or(0)),
+                           std::max(*forwards.moving, facts.is_one_way ? 0 : *backwards.moving)};
+  if (facts.parameter >= zone.still && facts.parameter <= zone.moving) return std::nullopt;
+  return zone;
+}
+
 StepFinding judge_dead_zone(const DeadZoneFacts& facts) {
   const Bracket forwards = bracket_of(facts.responses, 1), backwards = bracket_of(facts.responses, -1);
   StepFinding finding{
@@ -271,7 +280,6 @@ StepFinding judge_dead_zone(const DeadZoneFacts& facts) {
     finding.action = "see whether another command stood in the way, and begin again";
     return finding;
   }
-  const double still = std::max(forwards.still.value_or(0), facts.is_one_way ? 0 : backwards.still.value_or(0));
   if (!forwards.moving || (!facts.is_one_way && !backwards.moving)) {
     finding.verdict = Verdict::fail;
     finding.action = "the accelerometer saw no motion: see whether the propeller turns, or allow more duty (--duty)";
@@ -289,14 +297,13 @@ StepFinding judge_dead_zone(const DeadZoneFacts& facts) {
     finding.verdict = Verdict::attention;
     finding.found += "; the station's limits let no duty below 0 through, so the robot itself was not asked";
     finding.action = "commission it again before that limit (duty_min) is widened";
-  } else if (const double moving = std::max(*forwards.moving, facts.is_one_way ? 0 : *backwards.moving);
-             facts.parameter < still || facts.parameter > moving) {
+  } else if (const auto zone = dead_zone_to_set(facts)) {
     finding.verdict = Verdict::attention;
     finding.action = fmt::format(
         "watch the propeller at a duty of {:.2f}: if it stands still, set `dead_zone` in {} to {:.2f}, or the "
         "parameter "
         "dead_zone_duty; if it turns, the motion is lost in the noise",
-        still, kSettings, (still + moving) / 2);
+        zone->still, kSettings, zone->middle());
   }
   return finding;
 }

@@ -67,6 +67,14 @@ struct DeadZoneFacts {
 };
 StepFinding judge_dead_zone(const DeadZoneFacts& facts);
 
+// The largest duty at which the propeller stood still, and the smallest that moved the robot; none: the parameter fits
+// them, or they are not known.
+struct DeadZoneToSet {
+  double still = 0, moving = 0;
+  double middle() const { return (still + moving) / 2; }
+};
+std::optional<DeadZoneToSet> dead_zone_to_set(const DeadZoneFacts& facts);
+
 struct MotorFacts {
   nlohmann::json fit;   // the result of the job `identify` with second_order; null: it failed
   std::string failure;  // why

@@ -26,7 +26,8 @@ constexpr double kLongestM = 100;
 constexpr std::size_t kLongestLine = 1000;
 
 // What the file of answers may hold.
-const std::vector<std::string> kQuestions{"free_ahead_m", "free_behind_m", "direction", "moved_m", "signed_by"};
+const std::vector<std::string> kQuestions{"free_ahead_m", "free_behind_m", "direction",
+                                          "moved_m",      "set_dead_zone", "signed_by"};
 
 std::optional<double> number_of(const std::string& line) {
   double value = 0;
@@ -54,7 +55,7 @@ void check_answer(const std::string& name, const json& answer) {
     if (std::ranges::find(kDirections, word) == kDirections.end()) {
       refuse(fmt::format("one of {}", fmt::join(kDirections, ", ")));
     }
-  } else if (name == "signed_by") {
+  } else if (name == "signed_by" || name == "set_dead_zone") {
     if (!answer.is_string()) refuse("a text");
   } else if (name == "moved_m") {
     if (!is_length && !answer.is_null()) refuse(fmt::format("a number of metres up to {}, or null", kLongestM));

@@ -300,6 +300,13 @@ json RobotAccess::fit(std::int64_t run_id, std::string& failure) const {
   }
 }
 
+std::string RobotAccess::set_parameter(const std::string& name, double value) const {
+  const StationAnswer answer =
+      ask("POST", path_ + "/commands?wait=verified", {{"kind", "set_parameter"}, {"name", name}, {"value", value}});
+  if (answer.status == 200 && answer.body.value("state", "") == "verified") return {};
+  return answer.status == 200 ? "the robot has not reported it" : text_or(answer.body, "detail", "refused");
+}
+
 std::string RobotAccess::mark(const std::string& line) const {
   constexpr int kFirstProblem = 300;
   try {

@@ -61,6 +61,8 @@ class RobotAccess {
   RecordedRun perform(const nlohmann::json& profile);
   DutyAnswer try_duty(double duty) const;                               // a command for 1 ms
   nlohmann::json fit(std::int64_t run_id, std::string& failure) const;  // null, with the reason
+  // The robot is at rest. The reason when it has not taken it, else empty.
+  std::string set_parameter(const std::string& name, double value) const;
   // A line of the station's own record; the reason when it is not stored, else empty.
   std::string mark(const std::string& line) const;
 

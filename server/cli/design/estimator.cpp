@@ -46,6 +46,8 @@ int run(const EstimatorQuestion& question, std::ostream& out) {
     if (known.are_known) {
       answer["doubts"] = analysis::json_of(std::span{known.doubts});
       answer["widening"] = analysis::or_null(control::widening(known.doubts));
+    } else if (known.is_of_fit) {
+      answer["doubts"] = nullptr;  // not known: robots are sent it as assumed
     }
     write_json(out, answer);
   } else if (model.is_met) {

@@ -9,7 +9,9 @@
 #include <cmath>
 
 #include "server/analysis/control_json.hpp"
+#include "server/analysis/metrics/metrics_json.hpp"
 #include "server/analysis/metrics/run_steps.hpp"
+#include "server/analysis/tuning/robot_controller.hpp"
 #include "server/api/bodies/controller_body.hpp"
 #include "server/cli/design/robustness_table.hpp"
 #include "server/cli/terminal/options.hpp"
@@ -24,8 +26,9 @@ constexpr long long kLargestSeed = (1LL << 53) - 1;  // what JSON holds exactly
 struct Measured {
   std::vector<analysis::MeasuredStep> steps;
   double began_at_s = 0;
-  std::string position_source;  // in words
-  std::string predicted_with;   // in words: what the run may not have had
+  std::string position_source;                     // in words
+  bool went_backwards = false;                     // some duty was below 0
+  std::optional<protocol::Controller> controller;  // in force at the step; none: not known
   std::optional<std::uint32_t> controller_checksum;
 };
 
@@ -55,29 +58,49 @@ std::string source_in_words(std::span<const analysis::MeasuredStep> steps,
   return fmt::format("{}, in {} of {} steps; in the others {}", measured, outside, steps.size(), own);
 }
 
-// In words: what the prediction assumes, and the run may not have had.
-std::string predicted_with(const Predict& options, std::span<const storage::StoredSample> samples) {
-  std::string words = fmt::format(
-      "plant {}, controller {}, duty {:g} to {:g}", options.plant.file.value_or("(29) of the paper"),
-      options.controller.file.value_or("(30) of the paper"), options.experiment.duty_min, options.experiment.duty_max);
-  if (!options.plant.file || !options.controller.file) {
-    words += "; if the run had others, give --plant and --controller";
-  }
-  const auto is_backwards = [](const storage::StoredSample& stored) { return stored.sample.duty < 0; };
-  if (options.experiment.duty_min < 0 && std::ranges::none_of(samples, is_backwards)) {
-    words += "; the run's duty was never below 0: if its motor turns one way only, give --duty-min 0";
-  }
-  return words;
-}
+// What steers in the prediction.
+struct Steering {
+  bool is_runs_own = false;
+  control::Discretisation controller;  // of a run's own: period, sections and DC gain alone
+  double duty_min = -1, duty_max = 1;
+  std::optional<std::uint32_t> checksum;  // as a robot computes it; none: no robot takes it
+  std::string name;                       // in words
+};
 
 // As a robot computes it that steers by the error, as the prediction does; none: no robot takes this controller.
-std::optional<std::uint32_t> checksum_of(const control::Discretisation& controller,
-                                         const control::ClosedLoopExperiment& experiment) {
-  const nlohmann::json made(analysis::json_of(controller));
-  nlohmann::json sent{{"duty_min", experiment.duty_min}, {"duty_max", experiment.duty_max}, {"derivative_on", "error"}};
+std::optional<std::uint32_t> checksum_of(const Steering& steering) {
+  const nlohmann::json made(analysis::json_of(steering.controller));
+  nlohmann::json sent{{"duty_min", steering.duty_min}, {"duty_max", steering.duty_max}, {"derivative_on", "error"}};
   for (const char* name : {"period_s", "dc_gain", "sections"}) sent["controller"][name] = made.at(name);
   const auto message = api::controller_from(api::Members{sent}, nullptr);
   return message ? std::optional{message->checksum} : std::nullopt;
+}
+
+Steering steering_of_run(const Predict& options, const protocol::Controller& of_run) {
+  Steering steering;
+  steering.is_runs_own = true;
+  steering.controller.options.period_s = of_run.period_us / 1e6;
+  steering.controller.sections = analysis::sections_of(of_run);
+  steering.controller.dc_gain = of_run.kp;
+  steering.duty_min = options.duty_min.value_or(of_run.duty_min);
+  steering.duty_max = options.duty_max.value_or(of_run.duty_max);
+  steering.checksum = of_run.checksum;
+  steering.name = fmt::format("the run's controller {} (checksum {:08x})", of_run.controller_id, of_run.checksum);
+  if (of_run.derivative_on == rheonaut_DERIVATIVE_ON_MEASUREMENT) {
+    steering.name += ", whose derivative acts on the position, and in the prediction on the error";
+  }
+  return steering;
+}
+
+Steering steering_of(const Predict& options, const Measured& measured) {
+  if (measured.controller && !options.controller.file) return steering_of_run(options, *measured.controller);
+  Steering steering;
+  steering.controller = discretised(read(options.controller), options.sampling).chosen;
+  steering.duty_min = options.duty_min.value_or(steering.duty_min);
+  steering.duty_max = options.duty_max.value_or(steering.duty_max);
+  steering.checksum = checksum_of(steering);
+  steering.name = "controller " + options.controller.file.value_or("(30) of the paper");
+  return steering;
 }
 
 // In words; empty where nothing can be compared.
@@ -90,6 +113,20 @@ std::string controllers_in_words(std::optional<std::uint32_t> predicted, std::op
       *of_run, *predicted);
 }
 
+// In words: what the prediction assumes, and the run may not have had.
+std::string predicted_with(const Predict& options, const Steering& steering, const Measured& measured) {
+  std::string words = fmt::format("plant {}, {}, duty {:g} to {:g}", options.plant.file.value_or("(29) of the paper"),
+                                  steering.name, steering.duty_min, steering.duty_max);
+  if (steering.is_runs_own) return options.plant.file ? words : words + "; if the run had another plant, give --plant";
+  if (!options.plant.file || !options.controller.file) {
+    words += "; if the run had others, give --plant and --controller";
+  }
+  if (steering.duty_min < 0 && !measured.went_backwards) {
+    words += "; the run's duty was never below 0: if its motor turns one way only, give --duty-min 0";
+  }
+  return words + controllers_in_words(steering.checksum, measured.controller_checksum);
+}
+
 double time_of(std::span<const analysis::StepPoint> points, std::uint32_t span, std::uint64_t seq) {
   const auto is_of_span = [span](const analysis::StepPoint& point) { return point.span == span; };
   const auto first = std::ranges::find_if(points, is_of_span);
@@ -99,8 +136,7 @@ double time_of(std::span<const analysis::StepPoint> points, std::uint32_t span, 
 }
 
 // Makes the experiment the run's first step of setpoint, with the disturbance that follows it.
-Measured follow(const Predict& options, control::ClosedLoopExperiment& experiment) {
-  const RunChoice& choice = options.run;
+Measured follow(const RunChoice& choice, control::ClosedLoopExperiment& experiment) {
   const std::vector<storage::StoredSample> samples = read_samples(choice);
   std::vector<analysis::StepPoint> points;
   for (const storage::StoredSample& stored : samples) points.push_back(analysis::step_point(stored));
@@ -114,8 +150,10 @@ Measured follow(const Predict& options, control::ClosedLoopExperiment& experimen
   }
   measured.began_at_s = first->at_s;
   measured.position_source = source_in_words(steps, reference);
-  measured.predicted_with = predicted_with(options, samples);
+  measured.went_backwards =
+      std::ranges::any_of(samples, [](const storage::StoredSample& stored) { return stored.sample.duty < 0; });
   measured.controller_checksum = read_controller_checksum(choice);
+  measured.controller = read_controller(choice, first->span, first->first_seq);
   experiment.setpoint_m = first->target_m - first->start_m;
   experiment.settling_band_m = first->band_m;  // of the robot's own step, also where the start is the true one
   experiment.duration_s = time_of(points, first->span, first->last_seq) - first->at_s;
@@ -151,6 +189,7 @@ analysis::OrderedJson measured_step_json(const analysis::MeasuredStep& step) {
                                {"position_sd_m", step.position_sd_m},
                                {"estimate_error", estimate_error_json(step.estimate_error)}};
   out.update(analysis::json_of(step.metrics));
+  out["position_doubt"] = analysis::position_doubt(analysis::json_of(step));
   return out;
 }
 
@@ -165,9 +204,9 @@ void add_row(Table& table, const std::string& name, double at_s, const control::
 }
 
 void write_table(std::ostream& out, const control::ClosedLoopExperiment& experiment,
-                 const control::ClosedLoopPrediction& prediction, const Measured& measured) {
+                 const control::ClosedLoopPrediction& prediction, const Measured& measured, const std::string& with) {
   if (!measured.steps.empty()) {
-    fmt::print(out, "compared with: {}\npredicted with: {}\n\n", measured.position_source, measured.predicted_with);
+    fmt::print(out, "compared with: {}\npredicted with: {}\n\n", measured.position_source, with);
   }
   Table table{{"step", "at (s)", "settling (s)", "overshoot (%)", "rise 10-90 % (s)", "error at the end (mm)"}};
   add_row(table, fmt::format("to {:g} m, predicted", experiment.setpoint_m), measured.began_at_s, prediction.step);
@@ -182,6 +221,10 @@ void write_table(std::ostream& out, const control::ClosedLoopExperiment& experim
             step.at_s, step.metrics, step.position_sd_m);
   }
   table.write(out);
+  for (const analysis::MeasuredStep& step : measured.steps) {
+    const std::string doubt = analysis::position_doubt(analysis::json_of(step));
+    if (!doubt.empty()) fmt::print(out, "{} at {:.4g} s: {}\n", text(step.cause), step.at_s, doubt);
+  }
   if (prediction.is_diverging) {
     fmt::print(out, "the predicted loop diverges: it is {:.3g} m off after {:.4g} s, where the prediction ends\n",
                prediction.measured_m.back(), prediction.time_s.back());
@@ -207,8 +250,6 @@ void add_world(CLI::App& command, control::ClosedLoopExperiment& e) {
   add("--duration-s", e.duration_s, "Length of the experiment")->check(positive());
   add("--disturbance-m", e.disturbance_m, "Offset of the measured position")->check(finite());
   add("--disturbance-at-s", e.disturbance_at_s, "When it begins; beyond the duration for none")->check(non_negative());
-  add("--duty-min", e.duty_min, "Lowest duty; 0 for a motor without reverse")->check(from_to(-1, 1));
-  add("--duty-max", e.duty_max, "Highest duty")->check(from_to(-1, 1));
   add("--profile-velocity-m-s", e.profile_velocity_m_s, "Limit of the reference's velocity; 0 for a plain step")
       ->check(non_negative());
   add("--profile-acceleration-m-s2", e.profile_acceleration_m_s2, "Limit of the reference's acceleration")
@@ -217,9 +258,9 @@ void add_world(CLI::App& command, control::ClosedLoopExperiment& e) {
   add("--seed", e.noise_seed, "Of the noise")->check(whole(0, kLargestSeed));
 }
 
-analysis::OrderedJson answer_of(const control::ClosedLoopExperiment& experiment,
-                                const control::DiscretisationChoice& controller,
-                                const control::ClosedLoopPrediction& prediction, const Measured& measured) {
+analysis::OrderedJson answer_of(const control::ClosedLoopExperiment& experiment, const Steering& steering,
+                                const control::ClosedLoopPrediction& prediction, const Measured& measured,
+                                const std::string& with) {
   analysis::OrderedJson answer = analysis::json_of(prediction);
   answer["experiment"] = {
       {"setpoint_m", experiment.setpoint_m},       {"duration_s", experiment.duration_s},
@@ -228,12 +269,11 @@ analysis::OrderedJson answer_of(const control::ClosedLoopExperiment& experiment,
   if (experiment.settling_band_m > 0) answer["experiment"]["settling_band_m"] = experiment.settling_band_m;
   answer["compared_with"] =
       measured.steps.empty() ? analysis::OrderedJson{} : analysis::OrderedJson(measured.position_source);
-  answer["predicted_with"] =
-      measured.steps.empty() ? analysis::OrderedJson{} : analysis::OrderedJson(measured.predicted_with);
+  answer["predicted_with"] = measured.steps.empty() ? analysis::OrderedJson{} : analysis::OrderedJson(with);
   const auto checksum_json = [](const std::optional<std::uint32_t>& checksum) {
     return checksum ? analysis::OrderedJson(*checksum) : analysis::OrderedJson{};
   };
-  answer["controller_checksum"] = checksum_json(checksum_of(controller.chosen, experiment));
+  answer["controller_checksum"] = checksum_json(steering.checksum);
   answer["run_controller_checksum"] = checksum_json(measured.controller_checksum);
   answer["measured_steps"] = analysis::OrderedJson::array();
   for (const analysis::MeasuredStep& step : measured.steps)
@@ -241,7 +281,8 @@ analysis::OrderedJson answer_of(const control::ClosedLoopExperiment& experiment,
   answer["plant"] = analysis::json_of(experiment.plant);
   answer["sections"] = analysis::json_of(experiment.controller);
   answer["period_s"] = experiment.period_s;
-  answer["method"] = text(controller.chosen.options.method);
+  answer["method"] =
+      steering.is_runs_own ? analysis::OrderedJson{} : analysis::OrderedJson(text(steering.controller.options.method));
   return answer;
 }
 
@@ -252,6 +293,12 @@ void add_options(CLI::App& command, Predict& options) {
   add_option(command, options.controller);
   add_options(command, options.sampling);
   add_world(command, options.experiment);
+  command
+      .add_option("--duty-min", options.duty_min,
+                  "Lowest duty; 0 for a motor without reverse (default: -1, with --run that of its controller)")
+      ->check(from_to(-1, 1));
+  command.add_option("--duty-max", options.duty_max, "Highest duty (default: 1, with --run that of its controller)")
+      ->check(from_to(-1, 1));
   add_options(command, options.run);
   for (const char* flag : {"--setpoint-m", "--duration-s", "--disturbance-m", "--disturbance-at-s"}) {
     command.get_option("--run")->excludes(flag);
@@ -259,34 +306,36 @@ void add_options(CLI::App& command, Predict& options) {
   command.add_flag("--robustness", options.with_robustness, "Also for other gains, the other fluid, a one-way motor");
   add_json_and_csv_flags(command, options.form);
   command.footer(
-      "With --run, the experiment is the run's first step of setpoint and the disturbance after it, and what the run\n"
-      "did stands beside the prediction.\n"
+      "With --run, the experiment is the run's first step of setpoint and the disturbance after it, with the "
+      "controller\n"
+      "that the robot had then unless --controller names another, and what the run did stands beside the prediction.\n"
       "Example: rheonaut predict --setpoint-m 0.1 --duration-s 40 --disturbance-m -0.05 --disturbance-at-s 20");
 }
 
 int run(const Predict& options, std::ostream& out) {
-  const control::DiscretisationChoice controller = discretised(read(options.controller), options.sampling);
   control::ClosedLoopExperiment experiment = options.experiment;
-  Measured measured = options.run.run ? follow(options, experiment) : Measured{};
-  measured.predicted_with +=
-      controllers_in_words(checksum_of(controller.chosen, experiment), measured.controller_checksum);
+  const Measured measured = options.run.run ? follow(options.run, experiment) : Measured{};
+  const Steering steering = steering_of(options, measured);
+  const std::string with = predicted_with(options, steering, measured);
   const Plant plant = read(options.plant);
   say_doubts(options.plant, plant);
   experiment.plant = plant.model;
-  experiment.controller = controller.chosen.sections;
-  experiment.period_s = options.sampling.period_s;
+  experiment.controller = steering.controller.sections;
+  experiment.period_s = steering.controller.options.period_s;
+  experiment.duty_min = steering.duty_min;
+  experiment.duty_max = steering.duty_max;
   const control::ClosedLoopPrediction prediction = control::predict_closed_loop(experiment);
   if (options.form.is_csv) {
     write_samples(out, prediction);
   } else if (options.form.is_json) {
-    analysis::OrderedJson answer = answer_of(experiment, controller, prediction, measured);
+    analysis::OrderedJson answer = answer_of(experiment, steering, prediction, measured, with);
     if (options.with_robustness) {
-      answer["robustness"] = analysis::json_of(control::robustness(experiment.plant, controller.chosen));
+      answer["robustness"] = analysis::json_of(control::robustness(experiment.plant, steering.controller));
     }
     write_json(out, answer);
   } else {
-    write_table(out, experiment, prediction, measured);
-    if (options.with_robustness) write_robustness(out, control::robustness(experiment.plant, controller.chosen));
+    write_table(out, experiment, prediction, measured, with);
+    if (options.with_robustness) write_robustness(out, control::robustness(experiment.plant, steering.controller));
   }
   return 0;
 }

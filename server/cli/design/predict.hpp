@@ -15,8 +15,9 @@ struct Predict {
   PlantChoice plant;
   ControllerChoice controller;
   Sampling sampling;
-  control::ClosedLoopExperiment experiment;  // plant and controller are filled in by run
-  RunChoice run;                             // whose first step, and disturbance, are then the experiment
+  control::ClosedLoopExperiment experiment;  // plant, controller and duty range are filled in by run
+  std::optional<double> duty_min, duty_max;  // none: those of the run's controller, or -1 and 1
+  RunChoice run;  // whose first step, and disturbance, are then the experiment, with its controller unless one is named
   bool with_robustness = false;
   OutputForm form;
 };

@@ -5,9 +5,11 @@
 
 #include <CLI/CLI.hpp>
 #include <limits>
+#include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <type_traits>
 
+#include "server/api/bodies/controller_body.hpp"
 #include "server/cli/terminal/options.hpp"
 #include "server/storage/query/run_reader.hpp"
 #include "server/storage/runs/run_queries.hpp"
@@ -62,6 +64,20 @@ std::optional<std::uint32_t> read_controller_checksum(const RunChoice& choice) {
       choice, [&](SQLite::Database& database) { return storage::read_snapshot(database, choice.run.value()); });
   if (!snapshot || snapshot->controller_checksum == 0) return std::nullopt;
   return snapshot->controller_checksum;
+}
+
+std::optional<protocol::Controller> read_controller(const RunChoice& choice, std::uint32_t span, std::uint64_t seq) {
+  const auto snapshot = read_from(
+      choice, [&](SQLite::Database& database) { return storage::read_snapshot(database, choice.run.value()); });
+  nlohmann::json content;
+  for (const storage::InForce& document : snapshot ? snapshot->in_force : std::vector<storage::InForce>{}) {
+    const bool is_earlier = document.span == span && document.first_seq <= seq;
+    if (document.kind == "controller" && is_earlier) content = nlohmann::json::parse(document.content, nullptr, false);
+  }
+  if (!content.is_object()) return std::nullopt;
+  const nlohmann::json body{{"controller", content}};
+  const auto controller = api::controller_from(api::Members{body}, nullptr);
+  return controller ? std::optional{*controller} : std::nullopt;
 }
 
 }  // namespace server::cli

@@ -6,6 +6,7 @@
 #include <optional>
 #include <vector>
 
+#include "protocol/messages.hpp"
 #include "server/analysis/run_recording.hpp"
 
 namespace CLI {
@@ -27,5 +28,7 @@ std::optional<storage::StoredReference> read_reference(const RunChoice& choice);
 analysis::RunSamples read_run_samples(const RunChoice& choice);                   // with both
 // Of the controller that the robot had when the run began; none: not known.
 std::optional<std::uint32_t> read_controller_checksum(const RunChoice& choice);
+// Of the one in force at a sample of a span; none: not known.
+std::optional<protocol::Controller> read_controller(const RunChoice& choice, std::uint32_t span, std::uint64_t seq);
 
 }  // namespace server::cli

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "server/analysis/control_json.hpp"
+#include "server/analysis/tuning/robot_controller.hpp"
 #include "server/experiments/preview.hpp"
 #include "server/storage/experiments/experiment_store.hpp"
 
@@ -230,7 +231,7 @@ asio::awaitable<Result<void>> Conduct::check_travel(Profile profile, TimeLine re
   const auto duty_min = static_cast<double>(settings->controller->duty_min);
   const auto duty_max = static_cast<double>(settings->controller->duty_max);
   auto job = [duty_min, duty_max, profile = std::move(profile), rest = std::move(rest), model = model_in_use().model,
-              sections = sections_of(*settings->controller), position_m]() -> Result<void> {
+              sections = analysis::sections_of(*settings->controller), position_m]() -> Result<void> {
     try {
       const Preview left = preview_of(profile, rest, model, sections, duty_min, duty_max, position_m);
       if (left.problems.empty()) return {};

@@ -17,6 +17,7 @@
 #include <vector>
 
 #include "server/experiments/adaptive/until_known.hpp"
+#include "server/experiments/limits_check.hpp"
 #include "server/experiments/runner/prediction.hpp"
 #include "server/experiments/runner/run_driver.hpp"
 #include "server/experiments/runner/stubborn_writer.hpp"
@@ -31,6 +32,9 @@ inline constexpr const char* kOtherController = "other_controller";
 inline constexpr const char* kRightEnded = "right_ended";  // of who it acts for
 
 Profile way_back();  // one setpoint, to 0
+
+// What a robot says that it takes; null: it has said nothing.
+RobotLimits limits_of(const station::RobotSettings* settings);
 
 // The controller of a name that a profile mentions, for this robot. Errors say what is wrong with the name.
 using ControllerByName =
@@ -87,6 +91,7 @@ class Conduct {
 
   boost::asio::awaitable<std::optional<Variant>> next_run();  // none: there is no more
   boost::asio::awaitable<void> one_run(Variant variant);
+  boost::asio::awaitable<void> check_limits_of_robot();
   boost::asio::awaitable<void> prepare(Variant variant);
   boost::asio::awaitable<void> await_fluid(std::string fluid);
   boost::asio::awaitable<void> await_flow();

@@ -5,7 +5,6 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
-#include "server/experiments/limits_check.hpp"
 #include "server/experiments/runner/conduct.hpp"
 #include "server/experiments/runner/pump_flow.hpp"
 
@@ -30,8 +29,33 @@ Profile way_back() {
   return profile;
 }
 
+RobotLimits limits_of(const station::RobotSettings* settings) {
+  RobotLimits limits;
+  if (settings == nullptr) return limits;
+  const bool is_known = settings->is_controller_current && settings->controller;
+  limits.has_reverse = !is_known || settings->controller->duty_min < 0;
+  const auto value = [settings](const char* name, float otherwise) {
+    return settings->parameters.value(name).value_or(otherwise);
+  };
+  const float largest_m = value("setpoint_limit_m", limits.setpoint_max_m);
+  limits.setpoint_min_m = std::max(-largest_m, value("position_limit_min_m", -largest_m));
+  limits.setpoint_max_m = std::min(largest_m, value("position_limit_max_m", largest_m));
+  limits.auto_limit_s = value("auto_limit_s", limits.auto_limit_s);
+  return limits;
+}
+
+// Of a robot that was away when the experiment was asked for, or was told other limits since: what it would refuse in
+// the middle of a run ends the experiment before anything begins.
+asio::awaitable<void> Conduct::check_limits_of_robot() {
+  auto find = [profile = profile_] { return demands_of(profile); };
+  const Demands demands = co_await parts_.maths.run(std::move(find));
+  const auto allowed = check_demands(demands, limits_of(parts_.driver.station.settings(experiment_.request.robot_id)));
+  if (!allowed) abort({"robot_limits", allowed.error().detail});
+}
+
 asio::awaitable<void> Conduct::prepare(Variant variant) {
   co_await await_link();
+  if (!abort_ && number_ == 1) co_await check_limits_of_robot();
   co_await await_actor();
   if (!abort_) take_control();
   if (!abort_) co_await await_fluid(variant.fluid);
@@ -193,7 +217,13 @@ asio::awaitable<std::uint64_t> Conduct::submit(const char* what, protocol::Comma
 }
 
 asio::awaitable<void> Conduct::send_controller(std::string name) {
-  const auto controller = co_await parts_.controller_by_name(name, experiment_.request.robot_id);
+  const std::int64_t ends_us = parts_.driver.clock.steady_us() + kCommandWithin.count();
+  auto controller = co_await parts_.controller_by_name(name, experiment_.request.robot_id);
+  while (!abort_ && !controller && controller.error().code == ErrorCode::unavailable &&
+         parts_.driver.clock.steady_us() < ends_us) {  // the disk, on which it is noted first
+    co_await parts_.driver.clock.sleep_for(kLook);
+    controller = co_await parts_.controller_by_name(name, experiment_.request.robot_id);
+  }
   if (abort_) co_return;  // SAFETY: what was decided meanwhile holds: nothing is sent any more
   if (!controller) {
     abort({"controller", fmt::format("controller '{}': {}", name, controller.error().detail)});

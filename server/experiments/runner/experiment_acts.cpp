@@ -38,12 +38,12 @@ Result<Experiments::Prepared> Experiments::prepare(const std::string& document, 
     prepared.profile = parse_profile(document, "profile");
     if (auto allowed = check_limits(prepared.profile, envelope, fluid); !allowed)
       return std::unexpected{allowed.error()};
+    prepared.demands = demands_of(prepared.profile);
     if (prepared.profile.until) {
       prepared.runs = static_cast<std::uint32_t>(prepared.profile.most_runs);
       const bool goes_back = prepared.profile.conditions.start == StartPosition::back;
       const double between_s = kBetweenRuns_s + (goes_back ? kWayBack_s : 0);
       prepared.duration_s = prepared.runs * (longest_duration_s(prepared.profile) + between_s);
-      prepared.longest_auto_s = goes_back ? kWayBack_s : 0;
       return prepared;
     }
     for (const Variant& variant : variants_of(prepared.profile)) {
@@ -52,7 +52,6 @@ Result<Experiments::Prepared> Experiments::prepare(const std::string& document, 
         prepared.duration_s +=
             static_cast<double>(prepared.profile.sweep.repeats) * time_line_of(prepared.profile, variant).duration_s();
     }
-    prepared.longest_auto_s = experiments::longest_auto_s(prepared.profile);
     return prepared;
   } catch (const std::invalid_argument& error) {
     return fail(ErrorCode::invalid, error.what(), "profile");
@@ -91,14 +90,8 @@ asio::awaitable<Result<ExperimentView>> Experiments::begin(storage::ExperimentRe
   if (request.is_unattended && !prepared->profile.is_unattended) {
     co_return fail(ErrorCode::invalid, "the profile does not say unattended = true", "unattended_not_allowed");
   }
-  const station::RobotSettings* settings = parts_.station.settings(request.robot_id);
-  const auto limit_s = settings == nullptr ? std::nullopt : settings->parameters.value("auto_limit_s");
-  if (limit_s && prepared->longest_auto_s > static_cast<double>(*limit_s)) {
-    co_return fail(ErrorCode::invalid,
-                   fmt::format("the profile stays in auto for {:.1f} s; the robot's auto_limit_s is {} s",
-                               prepared->longest_auto_s, *limit_s),
-                   "auto_limit");
-  }
+  const RobotLimits limits = limits_of(parts_.station.settings(request.robot_id));
+  if (auto taken = check_demands(prepared->demands, limits); !taken) co_return std::unexpected{taken.error()};
   Entry entry;
   entry.profile = std::move(prepared->profile);
   Experiment& experiment = entry.experiment;

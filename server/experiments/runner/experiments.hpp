@@ -133,7 +133,7 @@ class Experiments final : public station::StationSink {
     Profile profile;
     std::uint32_t runs = 0;
     double duration_s = 0;
-    double longest_auto_s = 0;
+    Demands demands;
   };
   static Result<Prepared> prepare(const std::string& document, const config::Envelope& envelope,
                                   const std::string& fluid);

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "server/analysis/control_json.hpp"
+#include "server/analysis/tuning/robot_controller.hpp"
 #include "server/experiments/preview_band.hpp"
 
 namespace server::experiments {
@@ -22,21 +23,8 @@ json thinned(const std::vector<double>& values, std::size_t every) {
 
 }  // namespace
 
-control::ParallelSections sections_of(const protocol::Controller& controller) {
-  control::ParallelSections sections;
-  for (pb_size_t i = 0; i < controller.pole_count; ++i) {
-    sections.first_order.push_back({controller.pole[i], controller.residue[i]});
-  }
-  for (pb_size_t i = 0; i < controller.biquad_b0_count; ++i) {
-    sections.second_order.push_back(
-        {controller.biquad_b0[i], controller.biquad_b1[i], controller.biquad_a1[i], controller.biquad_a2[i]});
-  }
-  sections.direct = static_cast<double>(controller.kp) - control::dc_gain(sections);
-  return sections;
-}
-
 std::string prediction_json(const PredictionRequest& request) {
-  const control::ParallelSections sections = sections_of(request.controller);
+  const control::ParallelSections sections = analysis::sections_of(request.controller);
   const Preview preview = preview_of(request.profile, request.line, request.model, sections,
                                      request.controller.duty_min, request.controller.duty_max);
   const std::size_t every = (preview.time_s.size() + kMostPredicted - 1) / kMostPredicted;

@@ -13,7 +13,6 @@
 
 #include "control/identification/planned_experiment.hpp"
 #include "control/models/plant_models.hpp"
-#include "control/responses/sections.hpp"
 #include "protocol/messages.hpp"
 #include "server/experiments/time_line.hpp"
 
@@ -31,8 +30,5 @@ struct PredictionRequest {
 };
 
 std::string prediction_json(const PredictionRequest& request);
-
-// As the robot runs them: `direct` corrected so that the DC gain is exactly kp.
-control::ParallelSections sections_of(const protocol::Controller& controller);
 
 }  // namespace server::experiments

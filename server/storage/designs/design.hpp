@@ -44,6 +44,12 @@ struct Design {
   std::int64_t made_at_us = 0;
 };
 
+// A controller that a run was made with, and the model that it was designed for.
+struct ControllerOfRun {
+  Design controller;
+  std::optional<Design> model;
+};
+
 // Which ones, newest first.
 struct DesignFilter {
   std::optional<DesignKind> kind;

@@ -108,6 +108,17 @@ Result<void> insert_design(SQLite::Database& database, Design& design, const sta
   return {};
 }
 
+std::vector<RunId> read_runs_made_with(SQLite::Database& database, DesignId id) {
+  SQLite::Statement rows{database,
+                         "SELECT DISTINCT run_id FROM run JOIN design_sent USING (robot_id, controller_checksum)"
+                         " WHERE (design_id = ?1 OR design_id IN (SELECT design_id FROM design WHERE model_id = ?1))"
+                         " AND state <> 'discarded' ORDER BY run_id DESC LIMIT ?2"};
+  bind_all(rows, id, static_cast<std::int64_t>(kMostRunsMadeWith));
+  std::vector<RunId> runs;
+  while (rows.executeStep()) runs.push_back(rows.getColumn(0).getInt64());
+  return runs;
+}
+
 }  // namespace
 
 asio::awaitable<Result<Design>> Designs::store(DesignRequest request, station::Author by) {
@@ -153,6 +164,50 @@ asio::awaitable<std::vector<Design>> Designs::list(DesignFilter filter) {
     while (rows.executeStep()) designs.push_back(design_of(rows));
     for (Design& design : designs) add_sources(database, design);
     return designs;
+  };
+  co_return co_await reader_.ask(std::move(query));
+}
+
+asio::awaitable<Result<void>> Designs::note_sent(DesignId id, station::RobotId robot_id,
+                                                 std::uint32_t controller_checksum) {
+  auto job = [id, robot_id = std::move(robot_id), controller_checksum,
+              now_us = clock_.utc_us()](Database& database) -> Result<void> {
+    try {
+      SQLite::Statement note{database.handle(),
+                             "INSERT OR IGNORE INTO design_sent (design_id, robot_id, controller_checksum, first_at_us)"
+                             " VALUES (?, ?, ?, ?)"};
+      execute(note, id, robot_id, controller_checksum, now_us);
+      return {};
+    } catch (const SQLite::Exception& error) {
+      return fail(ErrorCode::unavailable,
+                  fmt::format("nothing was sent: that design {} goes to {} could not be stored: {}; try again", id,
+                              robot_id, runtime::text_of(error)),
+                  "not_stored");
+    }
+  };
+  co_return co_await recorder_.on_disk(std::move(job));
+}
+
+asio::awaitable<std::vector<RunId>> Designs::runs_made_with(DesignId id) {
+  auto query = [id](SQLite::Database& database) { return read_runs_made_with(database, id); };
+  co_return co_await reader_.ask(std::move(query));
+}
+
+asio::awaitable<std::vector<ControllerOfRun>> Designs::controllers_of(RunId run) {
+  auto query = [run](SQLite::Database& database) {
+    const SQLite::Transaction moment{database};
+    SQLite::Statement rows{database,
+                           "SELECT design_id FROM design_sent JOIN run USING (robot_id, controller_checksum)"
+                           " WHERE run_id = ? ORDER BY design_id DESC LIMIT ?"};
+    bind_all(rows, run, static_cast<std::int64_t>(kMostControllersOfRun));
+    std::vector<ControllerOfRun> found;
+    while (rows.executeStep()) {
+      auto controller = read_design(database, rows.getColumn(0).getInt64());
+      if (!controller) continue;
+      auto model = controller->made.model ? read_design(database, *controller->made.model) : std::nullopt;
+      found.push_back({std::move(*controller), std::move(model)});
+    }
+    return found;
   };
   co_return co_await reader_.ask(std::move(query));
 }

@@ -16,6 +16,8 @@
 namespace server::storage {
 
 inline constexpr std::size_t kMostAncestors = 100;  // that are shown
+inline constexpr std::size_t kMostRunsMadeWith = 1000;
+inline constexpr std::size_t kMostControllersOfRun = 100;  // equal ones, each kept by itself
 
 class Designs {
  public:
@@ -28,6 +30,17 @@ class Designs {
 
   boost::asio::awaitable<Result<Design>> find(DesignId id);
   boost::asio::awaitable<std::vector<Design>> list(DesignFilter filter);
+
+  // A controller of a design is about to be sent to a robot. On disk when it answers: a run that begins with this
+  // checksum on this robot is made with the design. Errors: unavailable when the disk cannot be written.
+  boost::asio::awaitable<Result<void>> note_sent(DesignId id, station::RobotId robot_id,
+                                                 std::uint32_t controller_checksum);
+  // The runs that were made with it; with a model: with the controllers that were designed for it. Newest first, at
+  // most kMostRunsMadeWith.
+  boost::asio::awaitable<std::vector<RunId>> runs_made_with(DesignId id);
+
+  // The controllers that a run was made with, newest first: one, unless equal ones are kept. Empty: none is known.
+  boost::asio::awaitable<std::vector<ControllerOfRun>> controllers_of(RunId run);
 
   // Its parent, the parent of that, and so on.
   boost::asio::awaitable<std::vector<Design>> ancestors(DesignId id);

@@ -125,10 +125,17 @@ void store_experiment(Database& database, const Experiment& experiment, const st
 }
 
 void add_experiment_run(Database& database, ExperimentId id, const ExperimentRun& run, const std::string& prediction) {
-  SQLite::Statement add{database.handle(),
+  SQLite::Database& handle = database.handle();
+  SQLite::Transaction transaction{handle, SQLite::TransactionBehavior::IMMEDIATE};
+  SQLite::Statement add{handle,
                         "INSERT INTO experiment_run (experiment_id, number, state, run_id, variant, steps,"
                         " started_at_us, prediction) VALUES (?, ?, ?, ?, ?, ?, ?, nullif(?, ''))"};
   execute(add, id, run.number, text(run.state), run.run, run.variant, run.steps, run.started_at_us, prediction);
+  SQLite::Statement origin{handle,
+                           "INSERT INTO run_origin (run_id, experiment_id, number, variant, profile)"
+                           " SELECT ?, experiment_id, ?, ?, profile FROM experiment WHERE experiment_id = ?"};
+  if (run.run) execute(origin, *run.run, run.number, run.variant, id);
+  transaction.commit();
 }
 
 void end_experiment_run(Database& database, ExperimentId id, const ExperimentRun& run) {

@@ -23,7 +23,7 @@ void add_experiment(Database& database, Experiment& experiment, const station::A
 void store_experiment(Database& database, const Experiment& experiment,
                       const std::optional<station::AuditNote>& note = {});
 
-// A run that has begun, with its prediction (JSON, empty: none); and how it ended.
+// A run that has begun, with its prediction (JSON, empty: none) and, for good, its origin; and how it ended.
 void add_experiment_run(Database& database, ExperimentId id, const ExperimentRun& run, const std::string& prediction);
 void end_experiment_run(Database& database, ExperimentId id, const ExperimentRun& run);
 void note_knowledge(Database& database, ExperimentId id, const ExperimentRun& run);  // its knowledge

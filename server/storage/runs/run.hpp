@@ -81,6 +81,20 @@ struct InterruptedPart {
   std::string detail;
 };
 
+// The experiment that made a run.
+struct RunOrigin {
+  std::int64_t experiment = 0;
+  std::uint32_t number = 0;    // of the run in it, from 1
+  std::string profile_sha256;  // of the profile's document as it was performed
+};
+
+// The same with what was performed.
+struct PerformedProfile {
+  RunOrigin origin;
+  std::string variant;   // JSON: fluid, controller, factors, repeat, step
+  std::string document;  // TOML or JSON
+};
+
 struct Run {
   RunId id = 0;
   station::RobotId robot_id;
@@ -100,6 +114,7 @@ struct Run {
   std::uint64_t samples_lost = 0;            // known to be lost for good; expected - stored - lost is still on its way
   std::optional<MissedTicks> missed;         // counted with the digest, when the run has ended; none: not yet
   std::vector<InterruptedPart> interrupted;  // in order of time
+  std::optional<RunOrigin> origin;           // none: it is of no experiment
 };
 
 // What a run was made with, as far as it is known.

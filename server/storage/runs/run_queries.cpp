@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 
+#include "server/runtime/sha256.hpp"
 #include "server/storage/database/statement.hpp"
 #include "server/storage/samples/boot_times.hpp"
 
@@ -83,13 +84,28 @@ class Interruptions {
   BootTimes times_{database_};
 };
 
-// Fills in spans and counts, run by run.
+constexpr const char* kOfOrigin = "SELECT experiment_id, number, variant, profile FROM run_origin WHERE run_id = ?";
+
+std::optional<PerformedProfile> performed_profile(SQLite::Statement& of_origin, RunId id) {
+  bind_all(of_origin, id);
+  if (!of_origin.executeStep()) return std::nullopt;
+  PerformedProfile performed;
+  performed.origin.experiment = of_origin.getColumn(0).getInt64();
+  performed.origin.number = of_origin.getColumn(1).getUInt();
+  performed.variant = of_origin.getColumn(2).getString();
+  performed.document = of_origin.getColumn(3).getString();
+  performed.origin.profile_sha256 = runtime::sha256_of(performed.document);
+  return performed;
+}
+
+// Fills in spans, counts and origin, run by run.
 class RunReading {
  public:
   RunReading(SQLite::Database& database, const BootHeads& heads) : database_{database}, heads_{heads} {}
 
   void complete(Run& run) {
     const bool has_digest = read_digest(run);
+    if (auto performed = performed_profile(origin_, run.id)) run.origin = std::move(performed->origin);
     bind_all(spans_, run.id);
     while (spans_.executeStep()) {
       const std::int64_t boot_key = spans_.getColumn(0).getInt64();
@@ -150,6 +166,7 @@ class RunReading {
   SQLite::Statement lost_{database_,
                           "SELECT coalesce(sum(min(last_seq, ?3) - max(first_seq, ?2) + 1), 0) FROM gap"
                           " WHERE boot_key = ?1 AND first_seq <= ?3 AND last_seq >= ?2"};
+  SQLite::Statement origin_{database_, kOfOrigin};
   Interruptions interruptions_{database_};
 };
 
@@ -179,6 +196,11 @@ std::optional<Run> find_run(SQLite::Database& database, const BootHeads& heads, 
   Run run = run_from(query);
   RunReading{database, heads}.complete(run);
   return run;
+}
+
+std::optional<PerformedProfile> read_performed_profile(SQLite::Database& database, RunId id) {
+  SQLite::Statement of_origin{database, kOfOrigin};
+  return performed_profile(of_origin, id);
 }
 
 std::vector<InterruptedPart> read_interrupted_parts(SQLite::Database& database, RunId id) {

@@ -20,6 +20,8 @@ namespace server::storage {
 using BootHeads = std::map<station::BootId, std::uint64_t>;
 
 std::optional<Run> find_run(SQLite::Database& database, const BootHeads& heads, RunId id);
+// None: the run is of no experiment, or there is no such run.
+std::optional<PerformedProfile> read_performed_profile(SQLite::Database& database, RunId id);
 // Of a database of any schema. Empty: none, or there is no such run.
 std::vector<InterruptedPart> read_interrupted_parts(SQLite::Database& database, RunId id);
 std::optional<RunState> read_run_state(SQLite::Database& database, RunId id);

@@ -267,6 +267,11 @@ asio::awaitable<Result<RunSnapshot>> Runs::snapshot(RunId id) {
   co_return std::move(*snapshot);
 }
 
+asio::awaitable<std::optional<PerformedProfile>> Runs::performed_profile(RunId id) {
+  auto query = [id](SQLite::Database& database) { return read_performed_profile(database, id); };
+  co_return co_await reader_.ask(std::move(query));
+}
+
 asio::awaitable<Result<Run>> Runs::find(RunId id) {
   std::optional<Run> run = co_await read(id);
   if (!run) co_return std::unexpected{no_such_run(id)};

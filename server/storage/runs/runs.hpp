@@ -63,6 +63,7 @@ class Runs final : public station::StationSink {
   // Of the station's configuration, as JSON: what each run keeps of it.
   void set_station_document(std::string json) { station_document_ = std::move(json); }
   boost::asio::awaitable<Result<RunSnapshot>> snapshot(RunId id);
+  boost::asio::awaitable<std::optional<PerformedProfile>> performed_profile(RunId id);  // none: of no experiment
 
   // The fluids that runs may name. Others are refused as invalid; before this call those that are built in.
   void set_envelope(config::Envelope envelope) { envelope_ = std::move(envelope); }

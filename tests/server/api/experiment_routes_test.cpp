@@ -84,6 +84,37 @@ TEST_F(ExperimentRoutesTest, ASignOfLifeIsOfTheProgramThatBeganIt) {
   EXPECT_EQ(entry["detail"]["by"], "token:local, script script-t");
 }
 
+TEST_F(ExperimentRoutesTest, WhatTheRobotWouldRefuseEndsItBeforeAnythingBegins) {
+  const auto profile = [](const json& step) {
+    json made = rest(1);
+    made["step"] = json::array({step, {{"kind", "rest"}, {"for_s", 1}}});
+    return made;
+  };
+  const json backwards = profile({{"kind", "duty"}, {"duty", -0.2}, {"for_s", 1}});
+  const Answered waits = begin_one(backwards);  // of this robot nothing is known yet
+  ASSERT_EQ(waits.status, 202) << waits.body;
+  protocol::RobotFrame frame = rheonaut_RobotFrame_init_zero;
+  frame.which_body = rheonaut_RobotFrame_controller_tag;
+  frame.body.controller.controller_id = 2;
+  frame.body.controller.period_us = 10'000;
+  frame.body.controller.kp = frame.body.controller.direct = 3;
+  frame.body.controller.duty_max = 1;  // and duty_min 0: a motor without reverse
+  robot->send(frame);
+  clock.settle();
+  pass(60);
+  EXPECT_EQ(get(1)["state"], "aborted");
+  EXPECT_EQ(get(1)["reason"], "robot_limits");
+  EXPECT_EQ(get(1)["runs"], json::array());
+  EXPECT_TRUE(robot->commands().empty());
+
+  const Answered refused = begin_one(backwards);
+  EXPECT_EQ(refused.status, 422);
+  EXPECT_EQ(refused.parsed()["reason"], "out_of_range");
+  EXPECT_THAT(refused.parsed()["detail"].get<std::string>(),
+              HasSubstr("step 1: duty = -0.2, and the robot's motor has no reverse"));
+  EXPECT_EQ(begin_one(profile({{"kind", "duty"}, {"duty", 0.2}, {"for_s", 1}})).status, 202);
+}
+
 TEST_F(ExperimentRoutesTest, IsQueuedRecordedAndShown) {
   pass(1);
   const Answered begun = begin_one(rest(1), {{"notes", "quiet"}, {"priority", 5}});

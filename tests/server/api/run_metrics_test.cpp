@@ -203,14 +203,15 @@ TEST_F(RunMetricsTest, SeveralRunsStandSideBySide) {
 }
 
 TEST(MetricsComparison, StepsAreThoseThatAllRunsHaveWithTheSameCause) {
-  const auto step = [](const char* cause, json settling_s) {
-    return json{{"cause", cause}, {"position_source", "estimate"}, {"settling_s", settling_s}, {"overshoot_percent", 0},
-                {"peak_m", 0.1},  {"rise_10_90_s", nullptr},       {"steady_state_error_m", 0}};
+  const auto step = [](const char* cause, json settling_s, double position_sd_m = 0.0005) {
+    return json{{"cause", cause},  {"position_source", "estimate"}, {"position_sd_m", position_sd_m},
+                {"band_m", 0.002}, {"settling_s", settling_s},      {"overshoot_percent", 0},
+                {"peak_m", 0.1},   {"rise_10_90_s", nullptr},       {"steady_state_error_m", 0}};
   };
   const std::vector<storage::Run> runs(2);
   const std::vector<json> documents{
       {{"figures", {{"gaps", 0}}}, {"steps", {step("setpoint", 1.0), step("disturbance", 2.0), step("setpoint", 9)}}},
-      {{"figures", {{"gaps", 2}}}, {"steps", {step("setpoint", 1.5), step("disturbance", nullptr)}}}};
+      {{"figures", {{"gaps", 2}}}, {"steps", {step("setpoint", 1.5, 0.03), step("disturbance", nullptr)}}}};
   const json compared = analysis::comparison_json(runs, documents);
   ASSERT_EQ(compared["steps"].size(), 2U);
   EXPECT_EQ(compared["steps"][0]["measures"][0]["name"], "settling_s");
@@ -220,6 +221,8 @@ TEST(MetricsComparison, StepsAreThoseThatAllRunsHaveWithTheSameCause) {
     EXPECT_TRUE(compared["steps"][1]["measures"][0][name].is_null()) << name << " of those that settled is too good";
   }
   EXPECT_THAT(compared["steps"][0]["position_source"], ElementsAre("estimate", "estimate"));
+  EXPECT_THAT(compared["steps"][0]["position_doubt"],
+              ElementsAre("", "± 60 mm is 30 times the band of 2.0 mm: this shows the belief only"));
   EXPECT_EQ(compared["figures"][0]["mean"], 1);
   EXPECT_TRUE(compared["differing_conditions"].empty());
 }

@@ -104,11 +104,14 @@ TEST(CommissionMotion, TellsAReversedMotorFromASensorThatIsTheWrongWayRound) {
   EXPECT_THAT(judge_imu_axis({pushed(-0.1), SeenByPerson::forwards}).found, HasSubstr("wrong way round"));
 }
 
-StepFinding dead_zone_of(double dead_zone, double parameter) {
+DeadZoneFacts dead_zone_facts(double dead_zone, double parameter) {
   DeadZoneFacts facts;
   facts.responses = responses_of(driven(pushes_profile(kPlan), 0.1, dead_zone, 0.012), 0.012);
   facts.parameter = parameter;
-  return judge_dead_zone(facts);
+  return facts;
+}
+StepFinding dead_zone_of(double dead_zone, double parameter) {
+  return judge_dead_zone(dead_zone_facts(dead_zone, parameter));
 }
 
 TEST(CommissionMotion, FindsTheDeadZoneBetweenTwoDuties) {
@@ -118,6 +121,12 @@ TEST(CommissionMotion, FindsTheDeadZoneBetweenTwoDuties) {
   EXPECT_EQ(unknown.figures.at("forwards").at("still_at"), 0.06);
   EXPECT_EQ(unknown.figures.at("backwards").at("moves_at"), 0.1);
   EXPECT_EQ(dead_zone_of(0.08, 0.08).verdict, Verdict::pass) << "one that the robot knows";
+  const auto to_set = dead_zone_to_set(dead_zone_facts(0.08, 0));
+  ASSERT_TRUE(to_set);
+  EXPECT_NEAR(to_set->middle(), 0.08, 1e-12);
+  EXPECT_EQ(to_set->moving, 0.1);
+  EXPECT_FALSE(dead_zone_to_set(dead_zone_facts(0.08, 0.08)));
+  EXPECT_FALSE(dead_zone_to_set(dead_zone_facts(0.9, 0))) << "where nothing moves";
   EXPECT_EQ(dead_zone_of(0.9, 0).verdict, Verdict::fail) << "a motor that does not turn";
 }
 

@@ -63,6 +63,14 @@ TEST_F(LoopTools, AModelInGraveDoubtIsForTheRobotToAssume) {
   EXPECT_EQ(json["widening"], 14);
   save("fit.json", fit_with(R"(, "doubts": [])"));
   EXPECT_THAT(ask("estimator --plant @fit.json").text, HasSubstr("with model_confirmed = 1 in this fluid only"));
+  save("fit.json", fit_with(""));
+  EXPECT_THAT(ask("estimator --plant @fit.json").text,
+              HasSubstr("as assumed only, with model_confirmed = 0, since it is "
+                        "in doubt: an earlier version has made this fit"));
+  const auto of_earlier = ask("estimator --plant @fit.json --json").json();
+  EXPECT_TRUE(of_earlier.contains("doubts"));
+  EXPECT_EQ(of_earlier["doubts"], nullptr);
+  EXPECT_FALSE(ask("estimator --plant non_newtonian --json").json().contains("doubts")) << "nobody fitted it";
 }
 
 TEST_F(LoopTools, BodeGivesTheMarginsOfThePapersLoop) {

@@ -1,6 +1,7 @@
 // `predict --run`: a recorded step beside the step of a loop that is named.
 #include <gmock/gmock.h>
 
+#include "server/api/bodies/controller_body.hpp"
 #include "tests/server/cli/run_tools_fixture.hpp"
 
 namespace server {
@@ -58,6 +59,41 @@ TEST_F(RunTools, PredictSaysWhetherTheRunBeganWithItsController) {
               HasSubstr(fmt::format("; the run began with ANOTHER controller: its checksum is {:08x}, that of the "
                                     "prediction {:08x}, so coefficients, period, duty range or derivative differ\n",
                                     robot_.controller_checksum, other["controller_checksum"].get<std::uint32_t>())));
+}
+
+TEST_F(RunTools, PredictTakesTheControllerThatTheRunHad) {
+  protocol::Controller controller = rheonaut_Controller_init_zero;
+  controller.controller_id = 7;
+  controller.period_us = 20'000;
+  controller.kp = controller.direct = 2;
+  controller.duty_min = 0;
+  controller.duty_max = 0.625F;
+  controller.checksum = robot_.controller_checksum = api::checksum_of(controller);
+  recorder_->on_in_force(station::RobotState{},
+                         {.boot_id = robot_.boot_id, .is_change = false, .first_seq = 0, .content = controller});
+  begin();
+  robot_.context.mode = rheonaut_MODE_AUTO;
+  robot_.context.setpoint_m = 0.2F;
+  swim(300, 0.3);
+  flush();
+  const auto predicted = ask("predict --run 1 --json").json();
+  EXPECT_EQ(predicted["controller_checksum"], controller.checksum);
+  EXPECT_EQ(predicted["sections"]["direct"], 2);
+  EXPECT_EQ(predicted["period_s"], 0.02);
+  EXPECT_EQ(predicted["method"], nullptr);
+  EXPECT_EQ(predicted["experiment"]["duty_min"], 0);
+  EXPECT_EQ(predicted["experiment"]["duty_max"], 0.625);
+  EXPECT_NEAR(predicted["duty"][0], 0.4, 1e-6) << "2 of a step of 0.2 m";
+  EXPECT_EQ(
+      predicted["predicted_with"],
+      fmt::format("plant (29) of the paper, the run's controller 7 (checksum {:08x}), duty 0 to 0.625; if the run "
+                  "had another plant, give --plant",
+                  controller.checksum));
+  EXPECT_EQ(ask("predict --run 1 --json --duty-max 0.5").json()["experiment"]["duty_max"], 0.5);
+  std::ofstream{folder_ / "named.json"} << R"({"kp": 29.971237, "kd": 0.10523527, "mu": 0.94550043})";
+  const auto named = ask("predict --run 1 --json --controller @named.json").json();
+  EXPECT_NE(named["controller_checksum"], controller.checksum);
+  EXPECT_THAT(named["predicted_with"].get<std::string>(), HasSubstr("ANOTHER controller"));
 }
 
 TEST_F(RunTools, PredictDoesNotCallAPositionKnownWhoseUncertaintyIsNot) {

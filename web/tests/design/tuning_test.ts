@@ -2,7 +2,7 @@
 import { expect, test } from 'vitest';
 import { kNothing } from '../../src/views/design/address';
 import { rounded, with_specification } from '../../src/views/design/ask';
-import type { MapPoint, Predicted, Pushed } from '../../src/views/design/design_api';
+import type { MapPoint, Predicted } from '../../src/views/design/design_api';
 import { log_splits, path_of, place_of } from '../../src/views/design/graph';
 import { identify_body } from '../../src/views/design/identify_step';
 import { float_text, push_state } from '../../src/views/design/push_step';
@@ -213,12 +213,10 @@ test('states, numbers and robustness in words', () => {
   ).toBe('Not stable in 1 of 2 cases.');
 });
 
-test('a run is compared with the controller that the design has sent, not with what the robot runs now', () => {
-  const sent = { design_id: 4, verified: true, in_force: { controller: { checksum: 11 } } } as unknown as Pushed;
-  expect(controller_note(11, 4, sent)).toBeNull();
-  expect(controller_note(12, 4, sent)?.is_other).toBe(true);
-  for (const pushed of [null, { ...sent, design_id: 5 }, { ...sent, verified: false }])
-    expect(controller_note(11, 4, pushed)?.text).toMatch(/is not known/);
+test('a run is compared with the controller that it was made with, whoever sent it, also after a reload', () => {
+  expect(controller_note(12, [14, 12, 9, 7])).toBe('');
+  expect(controller_note(11, [14, 12, 9, 7])).toMatch(/not known to be made with this controller; .* run 14, 12, 9\.$/);
+  expect(controller_note(11, [])).toMatch(/^No run is known/);
 });
 
 test('a run whose position is less exact than the band is not said to have verified anything', () => {

@@ -29,6 +29,7 @@ export const made_run = (said: Partial<Run> = {}): Run => ({
   samples_lost: 0,
   missed_ticks: 0,
   longest_missed_ticks: 0,
+  experiment: null,
   interrupted: [],
   ...said,
 });

@@ -6,7 +6,7 @@ import { millimetres, plus_minus } from '../../format';
 import { useAsked } from '../experiments/acts';
 import type { Step as StepMeasures } from '../runs/runs_api';
 import { change_design } from './address';
-import type { Measures, Predicted, Pushed, Tuned } from './design_api';
+import type { Measures, Predicted, Tuned } from './design_api';
 import type { StepProps } from './parts';
 import { Step } from './step';
 import { VerifyPlots } from './verify_plot';
@@ -29,21 +29,12 @@ export function predicted_for(
   return step.cause === 'disturbance' && is_of_size(-disturbance_m) ? predicted.disturbance : null;
 }
 
-// Whether a run was made with the controller that this design has sent; null: it was. What the robot runs now does not say.
-export function controller_note(
-  checksum: number,
-  design_id: number | null,
-  pushed: Pick<Pushed, 'design_id' | 'verified' | 'in_force'> | null,
-): { is_other: boolean; text: string } | null {
-  const is_of_design = pushed !== null && pushed.verified && pushed.design_id === design_id;
-  const sent = is_of_design ? pushed.in_force.controller?.checksum : undefined;
-  if (sent === undefined) {
-    return {
-      is_other: false,
-      text: 'Whether the run was made with this controller is not known: it was not sent from this page.',
-    };
-  }
-  return sent === checksum ? null : { is_other: true, text: 'The run was made with another controller than this one.' };
+// Whether a run was made with a kept controller, as the station says; empty: it was. What the robot runs now does not say.
+export function controller_note(run_id: number, runs_made_with: readonly number[]): string {
+  if (runs_made_with.includes(run_id)) return '';
+  if (runs_made_with.length === 0)
+    return 'No run is known that was made with this controller: send it, and run the experiment.';
+  return `The run is not known to be made with this controller; made with it: run ${runs_made_with.slice(0, 3).join(', ')}.`;
 }
 
 export function VerifyStep({ session, work, design, runs, tune }: StepProps) {
@@ -60,7 +51,13 @@ export function VerifyStep({ session, work, design, runs, tune }: StepProps) {
   const found = metrics.answer?.id === design.verified ? (metrics.answer?.found ?? null) : null;
   const run = own.find(({ run_id }) => run_id === design.verified);
   const tuned = work.tuning.answer_to(tune?.key)?.result ?? null;
-  const made_with = run && controller_note(run.controller_checksum, design.controller, work.pushed.value);
+  const controller = useAsked(
+    session,
+    async () => (design.controller === null ? null : work.api.design(design.controller)),
+    [design.controller, design.verified],
+  );
+  const is_asked = controller.answer?.design_id === design.controller && design.controller !== null;
+  const note = run && is_asked ? controller_note(run.run_id, controller.answer!.runs_made_with) : '';
   return (
     <Step
       work={work}
@@ -91,9 +88,9 @@ export function VerifyStep({ session, work, design, runs, tune }: StepProps) {
             value={String(design.verified ?? '')}
             on_choose={(value) => change_design({ ...design, verified: value === '' ? null : Number(value) })}
           />
-          {made_with && (
-            <p class={`design-note ${made_with.is_other ? 'design-caution' : 'quiet'}`} id="design-made-with">
-              {made_with.text}
+          {(note || controller.problem) && (
+            <p class="design-note design-caution" id="design-made-with">
+              {note || controller.problem}
             </p>
           )}
         </div>

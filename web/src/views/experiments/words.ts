@@ -72,6 +72,7 @@ export const kEnds: Record<string, string> = {
   not_at_rest: 'The robot did not come to rest.',
   lease_lapsed: 'A duty was not renewed in time, on a slow link.',
   command_late: 'A command came to the robot too late.',
+  robot_limits: 'The robot would refuse a duty or a setpoint of the profile.',
   no_room: 'From where the robot is, what is left would pass a limit of the profile.',
   not_recorded: 'Nothing is recorded: see to the disk of the station, then resume.',
   command_refused: 'A command was refused.',

@@ -63,6 +63,16 @@ function Table({ metrics }: { metrics: RunComparison }) {
             {in_order(step.measures).map((value) => (
               <Row key={value.name} value={value} />
             ))}
+            {step.position_doubt.map(
+              (doubt, of) =>
+                doubt !== '' && (
+                  <tr key={of}>
+                    <td colSpan={runs.length + 5}>
+                      #{runs[of]?.run_id}: {doubt}.
+                    </td>
+                  </tr>
+                ),
+            )}
           </tbody>
         ))}
         <tbody>

@@ -5,6 +5,7 @@ import { draft_of, type DraftName } from '../../drafts';
 import { count, date_and_time, duration, fluid_text } from '../../format';
 import { GuardedButton } from '../../parts/hold_button';
 import { OutcomeLine, useAsking } from '../../parts/request';
+import { format } from '../../route';
 import type { Session } from '../../session';
 import { interruptions_text } from './moments';
 import type { RunPage } from './run_page';
@@ -267,6 +268,17 @@ function Conditions({ run }: { run: Run }) {
           ['Tube', run.tube],
           ['Operator', run.operator_name],
           ['Profile', run.profile],
+          [
+            'Experiment',
+            run.experiment && (
+              <>
+                <a href={format({ view: 'experiments', parts: [String(run.experiment.experiment_id)] })}>
+                  {run.experiment.experiment_id}
+                </a>
+                , run {run.experiment.number}
+              </>
+            ),
+          ],
           ['Begun by', run.made_by + (run.made_afterwards ? ', afterwards' : '')],
           ['Firmware', run.firmware_version],
           ['Controller', `${run.controller_id} (${run.controller_checksum.toString(16).padStart(8, '0')})`],

@@ -1,0 +1,127 @@
+// A motor that stands still below some duty is named, and the fluid's parameters come out as without it.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "control/identification/identifiability.hpp"
+#include "control/identification/identify.hpp"
+#include "recorded_runs.hpp"
+
+namespace control {
+namespace {
+
+using testing::AllOf;
+using testing::Contains;
+using testing::Gt;
+using testing::HasSubstr;
+using testing::Le;
+using testing::Not;
+using testing::StartsWith;
+
+constexpr double kTickS = 0.01;
+constexpr FractionalModel kFluidOfMotor{0.1, 0.0045, 0.15, 1, 1.75, 0.85};
+const auto kStandsStill = StartsWith("the motor stands still below a duty between ");
+
+// Pushes of these duties, both ways, with rests: half a second each.
+std::vector<double> pushes(const std::vector<double>& duties) {
+  std::vector<double> all(100, 0);
+  for (int round = 0; round < 3; ++round) {
+    for (const double duty : duties) {
+      for (const double part : {duty, 0.0, -duty, 0.0}) all.insert(all.end(), 50, part);
+    }
+  }
+  return all;
+}
+
+std::vector<double> made_by_motor(std::vector<double> duty, double dead_zone) {
+  for (double& value : duty) value = std::abs(value) < dead_zone ? 0 : value;
+  return duty;
+}
+
+Recording accelerations(const std::vector<double>& duty, double dead_zone, unsigned seed) {
+  Recording run{kTickS, duty, {}, {}};
+  run.acceleration_m_s2 = output_of(kFluidOfMotor, Channel::acceleration, kTickS, made_by_motor(duty, dead_zone));
+  add_noise(run.acceleration_m_s2, 0.012, seed);
+  return run;
+}
+
+IdentificationOptions fractional_only() {
+  IdentificationOptions options = unhurried_options();
+  options.structure = Structure::fractional;
+  options.further_starts = 0;
+  return options;
+}
+
+const std::vector<double> kPushed{0.03, 0.06, 0.1, 0.15, 0.2, 0.3};
+
+TEST(DeadZone, IsNamedBetweenTheDutiesThatWereTried) {
+  for (const unsigned seed : {1U, 2U, 3U}) {
+    const Identification found = identify(accelerations(pushes(kPushed), 0.08, seed), fractional_only());
+    ASSERT_TRUE(found.dead_zone) << seed;
+    EXPECT_EQ(found.dead_zone->from_duty, 0.06);
+    EXPECT_EQ(found.dead_zone->to_duty, 0.1);
+    EXPECT_THAT(found.warnings, Contains(AllOf(kStandsStill, HasSubstr("set the robot's dead_zone_duty"))));
+    const auto doubt = std::ranges::find(found.doubts, DoubtCode::dead_zone, &Doubt::code);
+    ASSERT_NE(doubt, found.doubts.end());
+    EXPECT_DOUBLE_EQ(*doubt->value, 0.08);
+    EXPECT_FALSE(is_grave(*doubt));
+  }
+}
+
+// The parameters are those of the fluid, as the same record of a motor without a dead zone gives them.
+TEST(DeadZone, TheFluidComesOutAsWithoutIt) {
+  const auto found_behind = [](double dead_zone) {
+    Recording run{kTickS, pushes(kPushed), {}, {}};
+    run.position_m = output_of(kFluidOfMotor, Channel::position, kTickS, made_by_motor(run.duty, dead_zone));
+    add_noise(run.position_m, 2e-4, 3);
+    return identify(run, fractional_only());
+  };
+  const Identification found = found_behind(0.08), without = found_behind(0);
+  ASSERT_TRUE(found.dead_zone);
+  EXPECT_FALSE(without.dead_zone);
+  const auto parameters = parameters_of(found.best.model), expected = parameters_of(without.best.model);
+  for (std::size_t i = 0; i < kParameters; ++i) {
+    EXPECT_NEAR(parameters[i], expected[i], 3 * *found.best.one_sigma[i]) << kParameterNames[i];
+  }
+  EXPECT_FALSE(changes_with_amplitude(found.amplitude));
+}
+
+TEST(DeadZone, OfAChirpIsNamedOnAGrid) {
+  std::vector<double> duty;
+  for (int k = 0; k < 4000; ++k) duty.push_back(0.2 * std::sin(1e-5 * k * k + 0.01 * k));
+  const Identification found = identify(accelerations(duty, 0.08, 3), fractional_only());
+  ASSERT_TRUE(found.dead_zone);
+  EXPECT_THAT(found.dead_zone->from_duty, AllOf(Gt(0.06), Le(0.1)));
+}
+
+TEST(DeadZone, IsNotSeenInAMotorWithoutOne) {
+  for (const unsigned seed : {1U, 2U, 3U, 4U, 5U}) {
+    const Identification found = identify(accelerations(pushes(kPushed), 0, seed), fractional_only());
+    EXPECT_FALSE(found.dead_zone) << seed;
+    EXPECT_THAT(found.warnings, Not(Contains(kStandsStill)));
+  }
+}
+
+// A duty of one magnitude does not show it, and needs not: the robot was never driven below.
+TEST(DeadZone, IsNotAskedForWhereEachDutyMovesTheRobot) {
+  const Identification found = identify(accelerations(prbs_duty(0.6, 0.4, 20, kTickS), 0.08, 1), fractional_only());
+  EXPECT_FALSE(found.dead_zone);
+}
+
+// A drag that grows with the speed is no dead zone.
+TEST(DeadZone, IsNoDragThatFollowsTheSpeed) {
+  Recording run{kTickS, pushes(kPushed), {}, {}};
+  std::vector<double> drag = output_of(kFluidOfMotor, Channel::velocity, kTickS, run.duty);
+  for (double& velocity : drag) velocity *= 30 * std::abs(velocity);
+  run.velocity_m_s = output_of(kFluidOfMotor, Channel::velocity, kTickS, run.duty);
+  const std::vector<double> slower = output_of(kFluidOfMotor, Channel::velocity, kTickS, drag);
+  for (std::size_t k = 0; k < slower.size(); ++k) run.velocity_m_s[k] -= slower[k];
+  add_noise(run.velocity_m_s, 1e-5, 3);
+  EXPECT_FALSE(identify(run, fractional_only()).dead_zone);
+}
+
+}  // namespace
+}  // namespace control
