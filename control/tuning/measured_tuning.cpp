@@ -79,8 +79,9 @@ MeasuredTuning tune_measured(const MeasuredPlant& plant, const TuningSpec& spec)
     tuning.reason = why_no_solution(spec, tuning.theta_deg, tuning.phase_fall);
     return tuning;
   }
-  const FopdController controller = controller_for(demand, spec.mu ? *spec.mu : iso_damping_mu(demand));
-  tuning.reason = why_not_sound(plant, controller);
+  const double mu = spec.mu ? *spec.mu : iso_damping_mu(demand);
+  const auto controller = controller_for(demand, mu);
+  tuning.reason = controller ? why_not_sound(plant, *controller) : why_no_controller(spec, demand, mu);
   if (!tuning.reason.empty()) return tuning;
   tuning.controller = controller;
   add_sigmas(plant, tuning);

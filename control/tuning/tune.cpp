@@ -62,14 +62,15 @@ TuningResult tune(const FractionalModel& plant, const TuningSpec& spec) {
   check(spec);
   const PlantOnAxis on_axis{plant, spec.is_velocity_loop};
   const TuningDemand demand = tuning_demand(on_axis, std::log(spec.gain_crossover_rad_s), spec.phase_margin_deg);
+  check_response(plant, demand);
   TuningResult result;
   result.theta_deg = demand.theta_rad * kDegPerRad;
   result.phase_fall = demand.phase_fall;
   if (feasible_theta(spec.mu, demand.phase_fall).contains(demand.theta_rad)) {  // (5)
     const double mu = spec.mu ? *spec.mu : iso_damping_mu(demand);
-    TunedController design = tuned_controller(plant, spec, mu, name_of(spec));
-    result.is_feasible = is_sound(design);
-    if (!result.is_feasible) result.reason = why_not_sound(design);
+    auto design = tuned_controller(plant, spec, mu, name_of(spec));
+    result.is_feasible = design && is_sound(*design);
+    if (!result.is_feasible) result.reason = design ? why_not_sound(*design) : why_no_controller(spec, demand, mu);
     (result.is_feasible ? result.tuned : result.refused) = std::move(design);
   } else {
     result.reason = why_no_solution(spec, result.theta_deg, result.phase_fall);

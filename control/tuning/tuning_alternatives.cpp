@@ -123,8 +123,8 @@ class Search {
     TuningSpec spec = spec_;
     spec.gain_crossover_rad_s = target.gain_crossover_rad_s;
     spec.phase_margin_deg = target.phase_margin_deg;
-    TunedController found = tuned_controller(plant_, spec, *mu, name);
-    return is_sound(found) ? std::optional{std::move(found)} : std::nullopt;
+    auto found = tuned_controller(plant_, spec, *mu, name);
+    return found && is_sound(*found) ? std::move(found) : std::nullopt;
   }
 
   bool is_sound_at(double margin_deg) const { return design({spec_.gain_crossover_rad_s, margin_deg}, "").has_value(); }
@@ -168,14 +168,17 @@ class Search {
 
 }  // namespace
 
-TunedController tuned_controller(const FractionalModel& plant, const TuningSpec& spec, double mu, std::string name) {
+std::optional<TunedController> tuned_controller(const FractionalModel& plant, const TuningSpec& spec, double mu,
+                                                std::string name) {
   const PlantOnAxis on_axis{plant, spec.is_velocity_loop};
   const TuningDemand demand = tuning_demand(on_axis, std::log(spec.gain_crossover_rad_s), spec.phase_margin_deg);
-  const FopdController controller = controller_for(demand, mu);
-  const Margins achieved = margins({plant, controller, spec.is_velocity_loop});
-  if (spec.period_s == 0) return {std::move(name), spec, controller, achieved, achieved};
+  const auto controller = controller_for(demand, mu);
+  if (!controller) return std::nullopt;
+  const Margins achieved = margins({plant, *controller, spec.is_velocity_loop});
+  if (spec.period_s == 0) return TunedController{std::move(name), spec, *controller, achieved, achieved};
   const FractionalModel held = with_hold(plant, spec.period_s);
-  return {std::move(name), spec, controller, achieved, margins({held, controller, spec.is_velocity_loop})};
+  const Margins sampled = margins({held, *controller, spec.is_velocity_loop});
+  return TunedController{std::move(name), spec, *controller, achieved, sampled};
 }
 
 std::vector<PhaseMarginRange> sound_phase_margins(const FractionalModel& plant, const TuningSpec& spec) {
@@ -209,8 +212,8 @@ std::vector<TunedController> relaxed_designs(const FractionalModel& plant, const
   const auto offer = [&](double mu, const std::string& name) {
     TuningSpec with_mu = spec;
     with_mu.mu = mu;
-    TunedController design = tuned_controller(plant, with_mu, mu, name);
-    if (is_sound(design)) designs.push_back(std::move(design));
+    auto design = tuned_controller(plant, with_mu, mu, name);
+    if (design && is_sound(*design)) designs.push_back(std::move(*design));
   };
   if (demand.theta_rad < 0 || demand.theta_rad >= pi) return designs;
   if (demand.theta_rad < kPracticalMu * pi / 2 && spec.mu != kPracticalMu)

@@ -12,8 +12,10 @@
 
 namespace control {
 
-// Tunes to a specification that has a solution, with this mu, and measures what came of it.
-TunedController tuned_controller(const FractionalModel& plant, const TuningSpec& spec, double mu, std::string name);
+// Tunes to a specification that has a solution, with this mu, and measures what came of it. None where controller_for
+// has none.
+std::optional<TunedController> tuned_controller(const FractionalModel& plant, const TuningSpec& spec, double mu,
+                                                std::string name);
 
 // The phase margins with a sound iso-damped design at the specification's crossover, in ascending ranges: tried in 60
 // steps, and at the margin of the specification itself, which so lies in one of them exactly if tune grants it. Its mu

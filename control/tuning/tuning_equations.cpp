@@ -2,6 +2,7 @@
 #include "control/tuning/tuning_equations.hpp"
 
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 namespace control {
@@ -41,11 +42,19 @@ double iso_damping_mu(const TuningDemand& demand) {
   }
 }
 
-FopdController controller_for(const TuningDemand& demand, double mu) {
-  const double q_rad = mu * pi / 2;
-  const double derivative = std::sin(demand.theta_rad) / std::sin(q_rad - demand.theta_rad);  // (3)
-  const double log_gain = std::log(std::abs(1.0 + std::polar(derivative, q_rad)));
-  return {std::exp(-log_gain - demand.log_plant_gain), derivative * std::exp(-mu * demand.log_omega), mu};  // (6), (3)
+double derivative_part(double theta_rad, double mu) {
+  const double divisor = std::sin(mu * pi / 2 - theta_rad);
+  return divisor > 0 ? std::sin(theta_rad) / divisor : std::numeric_limits<double>::infinity();
+}
+
+std::optional<FopdController> controller_for(const TuningDemand& demand, double mu) {
+  const double derivative = derivative_part(demand.theta_rad, mu);  // (3)
+  if (!(derivative <= kLargestDerivative)) return std::nullopt;
+  const double log_gain = std::log(std::abs(1.0 + std::polar(derivative, mu * pi / 2)));
+  const double kp = std::exp(-log_gain - demand.log_plant_gain);    // (6)
+  const double kd = derivative * std::exp(-mu * demand.log_omega);  // (3)
+  if (!std::isnormal(kp) || !(kd == 0 || std::isnormal(kd))) return std::nullopt;
+  return FopdController{kp, kd, mu};
 }
 
 }  // namespace control

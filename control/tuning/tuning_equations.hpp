@@ -1,5 +1,8 @@
 // What a crossover and a phase margin ask of the controller, and the controller that gives it: (2) to (6) of tune.hpp.
 //
+// Where q - θ of (3) is a rounding error, kd ω^μ has no digits: the orders of a plant that are nearly 0 make R so small
+// that (4) is solved there. Then there is no controller, rather than an infinite or a negative one.
+//
 // Errors: none; the arguments have been checked.
 #pragma once
 
@@ -36,7 +39,13 @@ ThetaRange feasible_theta(std::optional<double> mu, double phase_fall);
 // The solution of (4). Needs 0 < θ < 180°.
 double iso_damping_mu(const TuningDemand& demand);
 
-// (3) and (6). Needs 0 ≤ θ < μπ/2.
-FopdController controller_for(const TuningDemand& demand, double mu);
+// From this kd ω^μ on the proportional part of the controller is smaller than the accuracy that tune.hpp states.
+inline constexpr double kLargestDerivative = 1e9;
+
+// (3): kd ω^μ, infinite where q - θ is a rounding error. Needs 0 ≤ θ < μπ/2.
+double derivative_part(double theta_rad, double mu);
+
+// (3) and (6). Needs 0 ≤ θ < μπ/2. None if kd ω^μ exceeds kLargestDerivative, or if kp or kd is no normal number.
+std::optional<FopdController> controller_for(const TuningDemand& demand, double mu);
 
 }  // namespace control

@@ -53,6 +53,29 @@ std::string why_not_iso_damped(const TuningSpec& spec, double theta_deg, double 
 
 }  // namespace
 
+std::string why_no_controller(const TuningSpec& spec, const TuningDemand& demand, double mu) {
+  std::ostringstream text;
+  text.precision(6);
+  const double derivative = derivative_part(demand.theta_rad, mu);
+  if (derivative <= kLargestDerivative) {
+    text << "the plant's gain at " << spec.gain_crossover_rad_s << " rad/s is e^" << demand.log_plant_gain
+         << ", and a controller for it with mu = " << mu
+         << " needs a kp or kd that is no normal number of double precision; check the plant's units";
+    return text.str();
+  }
+  text << "at " << spec.gain_crossover_rad_s
+       << " rad/s the controller would have to add theta = " << demand.theta_rad * kDegPerRad
+       << " degrees, which is all that mu = " << mu << " can add: kd omega^mu would be above " << kLargestDerivative
+       << ", and nothing would be left of the proportional part; ";
+  if (spec.mu) {
+    text << "ask for a larger mu or a smaller phase margin";
+  } else {
+    text << "the phase of the plant hardly falls there (R = " << demand.phase_fall
+         << " rad per unit of ln omega): ask with a fixed mu above " << mu;
+  }
+  return text.str();
+}
+
 std::string why_no_solution(const TuningSpec& spec, double theta_deg, double phase_fall) {
   return spec.mu ? why_not_with_mu(spec, theta_deg) : why_not_iso_damped(spec, theta_deg, phase_fall);
 }
