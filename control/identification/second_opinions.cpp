@@ -218,6 +218,7 @@ void add_initial_motion(OutputErrorSearch& search, const Recording& recording, c
     add_rough_beginning(recording, fit, warnings);
     return;
   }
+  if (!(std::abs(best.velocity_m_s) > kSlowestMotionM_S)) return;
   std::ostringstream text;
   text.precision(2);
   text << "the run seems to begin in motion, at about " << best.velocity_m_s << " m/s (" << best.sigmas

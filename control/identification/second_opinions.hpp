@@ -3,7 +3,8 @@
 //   an inverted sign: if the fit is poor, and inverting leaves less than half of the residual
 //   an offset, if it was not to be fitted: AIC lower by more than 10
 //   a run that begins in motion: v0 e^{-t/T} added to the model by one linear step, for the best of some T        (1)
-// (1) is the change of least squares with all parameters free, so a part of v0 that they can imitate does not count.
+// (1) is the change of least squares with all parameters free, so a part of v0 that they can imitate does not count,
+// and neither does a v0 up to kSlowestMotionM_S;
 // or first samples, 20 or one second of them, that fit three times worse than the rest.
 //   a duty that stands one row too early or too late: AIC lower by more than 10, where one linear step asks for it
 // Each costs one search at most, within the time that is left; none is tried when the search was cancelled.

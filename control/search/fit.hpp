@@ -16,6 +16,10 @@ namespace control {
 
 enum class Structure { fractional, second_order, first_order };
 
+// A step of a position of 1 m in binary32, 1.2e-7 m, over 12 samples of 10 ms: a record cannot tell a slower motion
+// from rest, and a slower one that is computed from it is rounding.
+inline constexpr double kSlowestMotionM_S = 1e-6;
+
 // Uniformly sampled; duty[k] holds from sample k to sample k + 1. An empty channel was not recorded. Given are
 // position, velocity or both, if they were measured; or the acceleration alone, as a robot records it
 // (sensor_readings.hpp). Values are finite.

@@ -102,8 +102,9 @@ std::optional<std::string> motion_at_start(const control::Recording& recording,
     speed = {channel.front(), start_of(first, 3).scatter};
     for (const double v : channel) peak_m_s = std::max(peak_m_s, std::abs(v));
   }
-  const double least = std::max(kSigmas * speed.sigma, (coasts ? kOfPeakCoasting : kOfPeak) * peak_m_s);
-  if (!(std::abs(speed.value) > least)) return std::nullopt;
+  const double least_m_s =
+      std::max({control::kSlowestMotionM_S, kSigmas * speed.sigma, (coasts ? kOfPeakCoasting : kOfPeak) * peak_m_s});
+  if (!(std::abs(speed.value) > least_m_s)) return std::nullopt;
   return fmt::format(
       "the recording begins in motion, at about {:.2g} m/s; the model assumes rest before the first sample, so its "
       "parameters may be wrong: begin the recording or the window at rest",

@@ -101,6 +101,20 @@ TEST(IdentifyDoubts, AStartInMotionIsNamedWithWhatItCostsTheParameters) {
   EXPECT_LT(std::abs(off - std::stod(percent[2]) / 100), 0.3 * std::abs(off)) << *named;
 }
 
+TEST(IdentifyDoubts, AMotionThatNoRecordTellsFromRestIsNone) {
+  for (const auto& [scale, is_named] : {std::pair{1.0, true}, {1e-3, true}, {1e-5, false}, {1e-13, false}}) {
+    Recording run = lag_run(1e-5, 801);
+    for (std::size_t k = 0; k < run.duty.size(); ++k) {
+      run.position_m[k] += 0.02 * 0.2 * (1 - std::exp(-0.01 * static_cast<double>(k) / 0.2));
+      run.position_m[k] *= scale;
+    }
+    const auto warnings = warnings_of(run);
+    EXPECT_THAT(warnings, is_named ? testing::Matcher<std::vector<std::string>>(Contains(HasSubstr("in motion")))
+                                   : Not(Contains(HasSubstr("in motion"))))
+        << scale;
+  }
+}
+
 TEST(IdentifyDoubts, ColourOfEitherChannelCounts) {
   for (const bool is_position : {true, false}) {
     Recording run = two_channel_run();
