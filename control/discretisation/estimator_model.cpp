@@ -6,6 +6,8 @@
 #include <cmath>
 #include <initializer_list>
 #include <limits>
+#include <numbers>
+#include <span>
 #include <vector>
 
 #include "base/invalid_argument.hpp"
@@ -18,7 +20,9 @@ constexpr int kLastTick = 6000;              // 60 s
 constexpr double kLateTick = 1e30;           // stands for the final velocity,
 constexpr double kLateWeight = 0.5;          // which may be off by twice as much
 constexpr double kFitRatio = 1.06;           // of the next time that is fitted to the last
-constexpr double kCompareRatio = 1.01;       // of the next time that is compared
+constexpr double kCompareRatio = 1.01;       // of the next time that is compared, at a tick or between ticks
+constexpr double kNearLargest = 0.9;         // of the largest error between ticks: a peak that may exceed it
+constexpr int kPeakSteps = 24;               // of the golden section: 1e-5 of the distance of two times
 constexpr double kLargestGain = 10;          // |g_i|
 constexpr double kLargestParameterM_S = 10;  // of a gain, on the robot
 constexpr double kShortestS = 0.005;         // τ_i; (2) is far from an exponential below it
@@ -244,7 +248,7 @@ EstimatorSections sections_of(const Candidate& candidate, double final_velocity_
   return sections;
 }
 
-double fit_error_of(const EstimatorSections& sections, const Target& target, double final_velocity_m_s) {
+double error_at_ticks(const EstimatorSections& sections, const Target& target, double final_velocity_m_s) {
   std::array<float, kEstimatorSections> share{}, section{};
   for (std::size_t i = 0; i < kEstimatorSections; ++i) {
     share[i] = decayed_share(static_cast<float>(kEstimatorPeriodS) / sections.time_constant_s[i]);
@@ -262,6 +266,69 @@ double fit_error_of(const EstimatorSections& sections, const Target& target, dou
     largest = std::max(largest,
                        std::abs(modelled - target.velocity[static_cast<std::size_t>(compared - target.tick.begin())]));
     ++compared;
+  }
+  return largest;
+}
+
+// |error| at any time, with sections that decay between the ticks as they do from tick to tick.
+class ErrorInTime {
+ public:
+  ErrorInTime(const EstimatorSections& sections, const FractionalModel& plant)
+      : sections_{sections}, plant_{plant}, final_velocity_m_s_{plant.kp / plant.b3} {
+    for (std::size_t i = 0; i < kEstimatorSections; ++i) {
+      rate_[i] = log_decay(std::log(static_cast<double>(sections.time_constant_s[i]))) / kEstimatorPeriodS;
+    }
+  }
+
+  std::vector<double> at(std::span<const double> time_s) const {
+    std::vector<double> error = step_response(plant_, 1 / final_velocity_m_s_, time_s).velocity_m_s;
+    for (std::size_t n = 0; n < time_s.size(); ++n) {
+      double velocity_m_s = 0;
+      for (std::size_t i = 0; i < kEstimatorSections; ++i) {
+        velocity_m_s -= static_cast<double>(sections_.gain_m_s[i]) * std::expm1(rate_[i] * time_s[n]);
+      }
+      error[n] = std::abs(velocity_m_s / final_velocity_m_s_ - error[n]);
+    }
+    return error;
+  }
+
+  double peak_between(double low_s, double high_s) const {
+    constexpr double kGolden = std::numbers::phi - 1;
+    const auto at_one = [this](double time_s) { return at(std::span{&time_s, 1}).front(); };
+    double a_s = high_s - kGolden * (high_s - low_s), b_s = low_s + kGolden * (high_s - low_s);
+    double at_a = at_one(a_s), at_b = at_one(b_s);
+    for (int step = 0; step < kPeakSteps; ++step) {
+      if (at_a > at_b) {
+        high_s = b_s, b_s = a_s, at_b = at_a;
+        a_s = high_s - kGolden * (high_s - low_s), at_a = at_one(a_s);
+      } else {
+        low_s = a_s, a_s = b_s, at_a = at_b;
+        b_s = low_s + kGolden * (high_s - low_s), at_b = at_one(b_s);
+      }
+    }
+    return std::max(at_a, at_b);
+  }
+
+ private:
+  const EstimatorSections& sections_;
+  const FractionalModel& plant_;
+  double final_velocity_m_s_;
+  std::array<double, kEstimatorSections> rate_{};
+};
+
+double error_between_ticks(const EstimatorSections& sections, const FractionalModel& plant) {
+  std::vector<double> time_s;
+  for (double t_s = kEstimatorPeriodS; t_s < kLastTick * kEstimatorPeriodS; t_s *= kCompareRatio) time_s.push_back(t_s);
+  time_s.push_back(kLastTick * kEstimatorPeriodS);
+  const ErrorInTime in_time{sections, plant};
+  const std::vector<double> error = in_time.at(time_s);
+  const double sampled = *std::ranges::max_element(error);
+  double largest = sampled;
+  for (std::size_t n = 1; n + 1 < error.size(); ++n) {
+    const bool is_peak = error[n] >= error[n - 1] && error[n] >= error[n + 1];
+    if (is_peak && error[n] > kNearLargest * sampled) {
+      largest = std::max(largest, in_time.peak_between(time_s[n - 1], time_s[n + 1]));
+    }
   }
   return largest;
 }
@@ -286,7 +353,8 @@ std::string reason_of(const FractionalModel& plant, double fit_error, const Targ
 
 double fit_error(const EstimatorSections& sections, const FractionalModel& plant) {
   check(plant);
-  return fit_error_of(sections, target_of(plant, kCompareRatio), plant.kp / plant.b3);
+  const double at_ticks = error_at_ticks(sections, target_of(plant, kCompareRatio), plant.kp / plant.b3);
+  return std::max(at_ticks, error_between_ticks(sections, plant));
 }
 
 EstimatorModel estimator_model(const FractionalModel& plant) {
@@ -303,9 +371,10 @@ EstimatorModel estimator_model(const FractionalModel& plant) {
   for (int sections = 1; sections <= static_cast<int>(kEstimatorSections) && model.fit_error > kGoodEnough;
        ++sections) {
     const EstimatorSections found = sections_of(search.best(sections, time_scale_s), final_velocity_m_s);
-    const double error = fit_error_of(found, compared, final_velocity_m_s);
+    const double error = error_at_ticks(found, compared, final_velocity_m_s);
     if (error < model.fit_error) model.sections = found, model.fit_error = error;
   }
+  model.fit_error = std::max(model.fit_error, error_between_ticks(model.sections, plant));
   // The error is relative to the final velocity: one that no robot reaches hides every other.
   model.is_met = model.fit_error <= kLargestFitError && std::abs(final_velocity_m_s) <= kLargestParameterM_S;
   if (!model.is_met) model.reason = reason_of(plant, model.fit_error, compared);

@@ -20,10 +20,10 @@ double steady_gain_m_s(const EstimatorSections& sections) {
   return std::accumulate(sections.gain_m_s.begin(), sections.gain_m_s.end(), 0.0);
 }
 
-// (1) with true exponentials and in double, at other times than those that are fitted.
+// (1) with true exponentials and in double, at other times than those that are fitted, most of them between ticks.
 double largest_error(const EstimatorSections& sections, const FractionalModel& plant) {
   std::vector<double> time_s;
-  for (int tick = 1; tick < 6000; tick += 1 + tick / 37) time_s.push_back(0.01 * tick);
+  for (double t_s = 0.01; t_s < 60; t_s *= 1.003) time_s.push_back(t_s);
   const auto response = step_response(plant, 1, time_s).velocity_m_s;
   double largest_m_s = 0;
   for (std::size_t n = 0; n < time_s.size(); ++n) {
@@ -79,6 +79,32 @@ TEST(EstimatorModel, WhatIsMetIsMetAtOtherTimesTooAndInFloat32) {
     EXPECT_NEAR(steady_gain_m_s(model.sections), fluid.kp, 0.01 * fluid.kp);
   }
   EXPECT_GE(met, 5);
+}
+
+// (2) at any time, in double, on a grid fifty times as dense as the one that the stated error is searched on.
+double densely_largest_error(const EstimatorSections& sections, const FractionalModel& plant) {
+  std::vector<double> time_s{60};
+  for (double t_s = 0.01; t_s < 60; t_s *= 1.0002) time_s.push_back(t_s);
+  const auto response = step_response(plant, plant.b3 / plant.kp, time_s).velocity_m_s;
+  double largest = 0;
+  for (std::size_t n = 0; n < time_s.size(); ++n) {
+    double velocity_m_s = 0;
+    for (std::size_t i = 0; i < kEstimatorSections; ++i) {
+      const double x = 0.01 / static_cast<double>(sections.time_constant_s[i]);
+      const double left = std::pow(1 - 12 * x / (12 + 6 * x + x * x), time_s[n] / 0.01);
+      velocity_m_s += static_cast<double>(sections.gain_m_s[i]) * (1 - left);
+    }
+    largest = std::max(largest, std::abs(velocity_m_s * plant.b3 / plant.kp - response[n]));
+  }
+  return largest;
+}
+
+TEST(EstimatorModel, StatesTheTrueErrorOfItsWholeInterval) {
+  for (const FractionalModel& fluid : fluid_family(35, 35)) {
+    const EstimatorModel model = estimator_model(fluid);
+    EXPECT_NEAR(model.fit_error, densely_largest_error(model.sections, fluid), 1e-5) << fluid.alpha;
+    EXPECT_EQ(model.is_met, model.fit_error <= kLargestFitError);
+  }
 }
 
 TEST(EstimatorModel, RefusesAPlantThatSwingsAndSaysHowNearItComes) {
