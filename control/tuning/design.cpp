@@ -2,6 +2,7 @@
 #include "control/tuning/design.hpp"
 
 #include <cmath>
+#include <sstream>
 
 namespace control {
 namespace {
@@ -9,6 +10,16 @@ namespace {
 constexpr double kSameCrossover = 1e-6;  // relative
 
 }  // namespace
+
+std::string remark_on(const FopdController& controller, double gain_crossover_rad_s) {
+  const double derivative = controller.kd * std::pow(gain_crossover_rad_s, controller.mu);
+  if (!(derivative > kMuchDerivative)) return {};
+  std::ostringstream text;
+  text.precision(3);
+  text << "kd omega^mu is " << derivative << " at the crossover, above " << kMuchDerivative
+       << ": nearly all of it is derivative, and errors that stay are corrected slowly";
+  return text.str();
+}
 
 FractionalModel with_hold(FractionalModel plant, double period_s) {
   plant.dead_time_s += period_s / 2;

@@ -25,6 +25,13 @@ struct TunedController {
   Margins sampled;   // as the robot runs it: of the plant with_hold
 };
 
+// From this kd ω^μ on, at its crossover, a controller is named as nearly all derivative. The paper's has 0.1 at 6
+// rad/s.
+inline constexpr double kMuchDerivative = 10;
+
+// A sentence about a controller with more than that, for its name and beside it; empty: none.
+std::string remark_on(const FopdController& controller, double gain_crossover_rad_s);
+
 // The plant as a controller of this period drives it: a duty that is held for T comes T/2 late in the mean,
 //   (1 - e^(-sT))/(sT) ≈ e^(-sT/2)       modulus within (ωT)²/24: 1.8 % at ωT = 0.65
 FractionalModel with_hold(FractionalModel plant, double period_s);

@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "control/tuning/tuning_equations.hpp"
+#include "control/tuning/tuning_ranges.hpp"
 
 namespace control {
 namespace {
@@ -29,7 +30,11 @@ struct DegreeRange {
 class Search {
  public:
   Search(const FractionalModel& plant, const TuningSpec& spec)
-      : plant_{plant}, on_axis_{plant, spec.is_velocity_loop}, spec_{spec} {}
+      : plant_{plant},
+        on_axis_{plant, spec.is_velocity_loop},
+        spec_{spec},
+        lowest_{std::log(std::min(kLowestCrossover_rad_s, spec.gain_crossover_rad_s))},
+        highest_{std::log(std::max(kHighestCrossover_rad_s, spec.gain_crossover_rad_s))} {}
 
   // At the specification's crossover, or another, the phase margin nearest to the one asked for. The ends of the range
   // that (5) allows are known, so that a narrow one is not missed; within it `count` margins are tried.
@@ -59,7 +64,7 @@ class Search {
   std::optional<TunedController> nearest_crossover(double step, const std::string& name) const {
     const double start = std::log(spec_.gain_crossover_rad_s), margin = spec_.phase_margin_deg;
     for (double log_omega = start + step, before = start; std::abs(log_omega - start) <= kSearchWidth;) {
-      if (std::abs(log_omega) > kLargestLogOmega) return std::nullopt;
+      if (!is_offered(log_omega)) return std::nullopt;
       const bool has_solution = mu_for({std::exp(log_omega), margin}).has_value();
       if (has_solution && design({std::exp(log_omega), margin}, name)) {
         return just_inside(log_omega, before, name);
@@ -76,7 +81,7 @@ class Search {
     const double start = std::log(spec_.gain_crossover_rad_s);
     for (int i = 1; i * kStep <= kSearchWidth; ++i) {
       for (const double log_omega : {start - i * kStep, start + i * kStep}) {
-        if (std::abs(log_omega) > kLargestLogOmega) continue;
+        if (!is_offered(log_omega)) continue;
         if (auto found = nearest_margin(std::exp(log_omega), kFewMargins, name)) return found;
       }
     }
@@ -108,6 +113,8 @@ class Search {
   struct Target {
     double gain_crossover_rad_s, phase_margin_deg;
   };
+
+  bool is_offered(double log_omega) const { return log_omega >= lowest_ && log_omega <= highest_; }
 
   // Of the equations' solution, if there is one.
   std::optional<double> mu_for(const Target& target) const {
@@ -158,12 +165,14 @@ class Search {
     const double high = std::min(180.0, at_theta_0_deg + theta.high_rad * kDegPerRad);
     if (low >= high) return std::nullopt;
     const double inside = std::min(kInsideDeg, (high - low) / 4);
-    return DegreeRange{low + inside, high - inside};
+    const DegreeRange offered{std::max(low + inside, kSmallestMarginDeg), std::min(high - inside, kLargestMarginDeg)};
+    return offered.low < offered.high ? std::optional{offered} : std::nullopt;
   }
 
   const FractionalModel& plant_;
   PlantOnAxis on_axis_;
   const TuningSpec& spec_;
+  double lowest_, highest_;  // ln ω of the crossovers that are offered
 };
 
 }  // namespace
@@ -174,6 +183,8 @@ std::optional<TunedController> tuned_controller(const FractionalModel& plant, co
   const TuningDemand demand = tuning_demand(on_axis, std::log(spec.gain_crossover_rad_s), spec.phase_margin_deg);
   const auto controller = controller_for(demand, mu);
   if (!controller) return std::nullopt;
+  const std::string remark = remark_on(*controller, spec.gain_crossover_rad_s);
+  if (!remark.empty()) name += "; " + remark;
   const Margins achieved = margins({plant, *controller, spec.is_velocity_loop});
   if (spec.period_s == 0) return TunedController{std::move(name), spec, *controller, achieved, achieved};
   const FractionalModel held = with_hold(plant, spec.period_s);
@@ -210,6 +221,7 @@ std::vector<TunedController> relaxed_designs(const FractionalModel& plant, const
   const TuningDemand demand = tuning_demand(on_axis, std::log(spec.gain_crossover_rad_s), spec.phase_margin_deg);
   std::vector<TunedController> designs;
   const auto offer = [&](double mu, const std::string& name) {
+    if (!(mu >= kLowestMu && mu <= kHighestMu)) return;
     TuningSpec with_mu = spec;
     with_mu.mu = mu;
     auto design = tuned_controller(plant, with_mu, mu, name);

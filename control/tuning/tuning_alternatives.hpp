@@ -4,7 +4,8 @@
 // Only sound designs are offered (is_sound of design.hpp). Nearest crossovers are looked for within a factor of 1e6, in
 // steps of 2 %, and margins in 60 steps of the range of a crossover, so that a band narrower than that may be missed.
 // What is offered lies a little inside the region of sound designs: 0.1 degrees or 0.1 % of the frequency, or less
-// where the region is narrow. Errors: none; the arguments have been checked.
+// where the region is narrow. All of it can be asked for: it lies within tuning_ranges.hpp, or, where the crossover of
+// the specification does not, between these ranges and that crossover. Errors: none; the arguments have been checked.
 #pragma once
 
 #include "control/tuning/design.hpp"

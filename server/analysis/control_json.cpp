@@ -273,6 +273,9 @@ OrderedJson json_of(const control::TuningResult& result) {
   OrderedJson out = {{"feasible", result.is_feasible}};
   if (result.tuned) {
     out.update(json_of(result.tuned->controller));
+    const std::string remark = control::remark_on(result.tuned->controller, result.tuned->spec.gain_crossover_rad_s);
+    out["warnings"] = OrderedJson::array();
+    if (!remark.empty()) out["warnings"].push_back(remark);
     out["achieved"] = json_of(result.tuned->achieved);
     out["sampled"] = json_of(result.tuned->sampled);
   } else {

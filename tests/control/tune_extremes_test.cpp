@@ -29,6 +29,13 @@ void expect_finite(const TunedController& design) {
   }
 }
 
+void expect_can_be_asked(const TunedController& design) {
+  const auto& [omega_rad_s, margin_deg, mu, is_velocity_loop, period_s] = design.spec;
+  EXPECT_TRUE(omega_rad_s >= 0.999999e-3 && omega_rad_s <= 1.000001e4) << omega_rad_s;
+  EXPECT_TRUE(margin_deg >= 0.1 && margin_deg <= 179.9) << margin_deg;
+  EXPECT_TRUE(!mu || (*mu >= 0.01 && *mu <= 1.99)) << *mu;
+}
+
 // A controller, or a reason; never an error from inside.
 void expect_answer(const FractionalModel& plant, const TuningSpec& spec) {
   SCOPED_TRACE(testing::Message() << "kp " << plant.kp << ", b " << plant.b1 << ' ' << plant.b2 << ' ' << plant.b3
@@ -48,7 +55,10 @@ void expect_answer(const FractionalModel& plant, const TuningSpec& spec) {
     if (*one) expect_finite(**one);
   }
   for (const auto* list : {&result.nearest, &result.relaxed}) {
-    for (const TunedController& design : *list) expect_finite(design);
+    for (const TunedController& design : *list) {
+      expect_finite(design);
+      expect_can_be_asked(design);
+    }
   }
 }
 
@@ -86,6 +96,30 @@ TEST(TuneExtremes, AGainThatNoControllerMeetsIsRefusedInWords) {
   } catch (const std::invalid_argument& error) {
     EXPECT_THAT(error.what(), HasSubstr("overflows double precision with b1 = 1e+200"));
   }
+}
+
+// The fluid of the paper, ten thousand times slower: its iso-damped designs end at 6.8e-4 rad/s and begin at 5.8e-3.
+TEST(TuneExtremes, WhatIsOfferedCanBeAskedFor) {
+  FractionalModel slow = kNonNewtonianModel;
+  slow.b1 *= std::pow(1e4, slow.alpha);
+  slow.b2 *= std::pow(1e4, slow.beta);
+  const TuningResult result = tune(slow, {2e-3, 95});
+  EXPECT_FALSE(result.is_feasible);
+  EXPECT_FALSE(result.nearest.empty());
+  for (const TunedController& design : result.nearest) expect_can_be_asked(design);
+}
+
+TEST(TuneExtremes, AControllerThatIsNearlyAllDerivativeSaysSo) {
+  const TuningResult result = tune(kNonNewtonianModel, {0.01, 120});
+  ASSERT_TRUE(result.tuned);
+  const auto& [kp, kd, mu] = result.tuned->controller;
+  EXPECT_GT(kd * std::pow(0.01, mu), 10);
+  EXPECT_THAT(result.tuned->name, HasSubstr("above 10: nearly all of it is derivative"));
+  EXPECT_EQ(remark_on(kPaperController, 6), "");
+  const TuningResult refused = tune(kNonNewtonianModel, {1, 179});
+  ASSERT_FALSE(refused.nearest.empty());
+  EXPECT_GT(refused.nearest[0].controller.kd, 10);  // at 1 rad/s
+  EXPECT_THAT(refused.nearest[0].name, HasSubstr("nearly all of it is derivative"));
 }
 
 // Orders and coefficients over many decades, crossovers and margins up to the ends of what can be asked.

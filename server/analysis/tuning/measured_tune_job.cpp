@@ -37,6 +37,8 @@ void add_controller(const MeasuredTuneRequest& request, const control::MeasuredT
   answer["kp"] = controller.kp;
   answer["kd"] = controller.kd;
   answer["mu"] = controller.mu;
+  const std::string remark = control::remark_on(controller, request.spec.gain_crossover_rad_s);
+  if (!remark.empty()) answer["warnings"].push_back(remark);
   answer["achieved"] = {{"phase_margin_sigma_deg", tuned.phase_margin_sigma_deg},
                         {"crossover_sigma_rad_s", tuned.crossover_sigma_rad_s},
                         {"phase_slope_sigma_deg_per_rad_s", tuned.phase_slope_sigma_deg_per_rad_s}};

@@ -1,12 +1,16 @@
-// Ranges of a tuning's specification, on the command line and of a job: beyond them are no robots, and a search for
-// what is near may take minutes.
+// Ranges of a tuning's specification, for rooms that do not use control.
 #pragma once
+
+#include "control/tuning/tuning_ranges.hpp"
 
 namespace server::analysis {
 
-inline constexpr double kLowestCrossover_rad_s = 1e-3, kHighestCrossover_rad_s = 1e4;
-inline constexpr double kSmallestMarginDeg = 0.1, kLargestMarginDeg = 179.9;
-inline constexpr double kLowestMu = 0.01, kHighestMu = 1.99;
-inline constexpr double kLongestPeriod_s = 1;  // of the robot's controller
+using control::kHighestCrossover_rad_s;
+using control::kHighestMu;
+using control::kLargestMarginDeg;
+using control::kLongestPeriod_s;
+using control::kLowestCrossover_rad_s;
+using control::kLowestMu;
+using control::kSmallestMarginDeg;
 
 }  // namespace server::analysis

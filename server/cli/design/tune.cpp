@@ -45,6 +45,8 @@ void write_asked_and_achieved(std::ostream& out, const Tune& options, const cont
              "achieved: the continuous loop, as in the paper. The robot holds its duty for {:g} s, half of which "
              "counts as dead time\n",
              options.spec.period_s);
+  const std::string remark = control::remark_on(c, tuned.spec.gain_crossover_rad_s);
+  if (!remark.empty()) fmt::print(out, "warning: {}\n", remark);
 }
 
 void write_offers(std::ostream& out, const char* title, std::span<const control::TunedController> offers) {

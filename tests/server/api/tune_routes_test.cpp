@@ -104,6 +104,19 @@ TEST_F(TuneRoutesTest, KeepsTheDutyRangeAndPeriodThatItIsGiven) {
   EXPECT_EQ(result["predicted"][0]["experiment"]["duty_min"], 0.0);
 }
 
+TEST_F(TuneRoutesTest, SaysOfAControllerThatItIsNearlyAllDerivative) {
+  const auto tuned = [this](double crossover_rad_s, double margin_deg) {
+    return done({{"kind", "tune"},
+                 {"plant", plant_json()},
+                 {"crossover_rad_s", crossover_rad_s},
+                 {"phase_margin_deg", margin_deg}});
+  };
+  EXPECT_EQ(tuned(3, 90)["warnings"], json::array());
+  const json result = tuned(0.01, 120);
+  ASSERT_EQ(result["warnings"].size(), 1U);
+  EXPECT_THAT(result["warnings"][0].get<std::string>(), HasSubstr("nearly all of it is derivative"));
+}
+
 // The paper's own specification.
 TEST_F(TuneRoutesTest, WhatNothingMeetsIsAResultWithAnOffer) {
   const json result =

@@ -122,6 +122,7 @@ export interface Tuned extends Law {
   relaxed: Near[];
   asked: Specification;
   plant: Plant;
+  warnings?: string[]; // about a controller that is found
   discretised: Discretised | null;
   robustness: { rows: RobustnessRow[]; duty_sd_per_noise_sd: number } | null;
   plant_doubts_text?: string; // a line for people; empty: nothing is in doubt

@@ -86,6 +86,11 @@ export function Achievement({ asked, tuned, own, is_dragged, on_ask }: Achieveme
           The model: {tuned.plant_doubts_text}.
         </p>
       )}
+      {tuned?.warnings?.map((text) => (
+        <p key={text} class="design-caution design-note">
+          The controller: {text}.
+        </p>
+      ))}
       {tuned && !tuned.feasible && <NotFeasible tuned={tuned} on_ask={on_ask} />}
       {!tuned && own?.law === null && (
         <p class="design-caution design-note">
