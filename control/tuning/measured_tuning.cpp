@@ -1,18 +1,24 @@
 // The demand on the controller comes from measured numbers; the rest is that of tune.
 #include "control/tuning/measured_tuning.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <sstream>
+#include <utility>
 
 #include "base/invalid_argument.hpp"
+#include "control/tuning/tuning_alternatives.hpp"
 #include "control/tuning/tuning_equations.hpp"
+#include "control/tuning/tuning_ranges.hpp"
 #include "control/tuning/tuning_refusal.hpp"
 
 namespace control {
 namespace {
 
 constexpr double kSameCrossover = 1e-9;  // relative
+constexpr double kInsideDeg = 0.1;       // how far inside the margins that have a solution an offer lies
+constexpr int kMargins = 1800;           // tried, over all of them
 // What the method itself may be wrong by, as three_tones.hpp states it: no noise, so no sigma of the record has it.
 constexpr double kModulusError = 0.014, kPhaseErrorDeg = 0.3, kPhaseFallError = 0.043;
 
@@ -56,6 +62,60 @@ std::string why_not_sound(const MeasuredPlant& plant, const FopdController& cont
   return text.str();
 }
 
+// The sound controller for a phase margin and a mu, none: iso-damped; if there is one.
+std::optional<FopdController> sound_controller(const MeasuredPlant& plant, const TuningSpec& spec) {
+  const TuningDemand demand = demand_of(plant.at_crossover(), plant.phase_fall, spec.phase_margin_deg);
+  if (!feasible_theta(spec.mu, demand.phase_fall).contains(demand.theta_rad)) return std::nullopt;
+  const auto controller = controller_for(demand, spec.mu ? *spec.mu : iso_damping_mu(demand));
+  return controller && why_not_sound(plant, *controller).empty() ? controller : std::nullopt;
+}
+
+void add_offer(const MeasuredPlant& plant, const TuningSpec& spec, std::string name,
+               std::vector<MeasuredOffer>& offers) {
+  const auto controller = sound_controller(plant, spec);
+  if (!controller) return;
+  const std::string remark = remark_on(*controller, spec.gain_crossover_rad_s);
+  offers.push_back({std::move(name) + (remark.empty() ? "" : "; " + remark), spec, *controller});
+}
+
+// The range of (5) and margins all over it, the nearest to what was asked for first.
+void add_nearest(const MeasuredPlant& plant, const TuningSpec& asked, MeasuredTuning& tuning) {
+  const double plain_deg = -demand_of(plant.at_crossover(), plant.phase_fall, 0).theta_rad * kDegPerRad;
+  const ThetaRange theta = feasible_theta(asked.mu, plant.phase_fall);
+  const double inside_deg = std::min(kInsideDeg, (theta.high_rad - theta.low_rad) / 4 * kDegPerRad);
+  const double low_deg = std::max(plain_deg + theta.low_rad * kDegPerRad + inside_deg, kSmallestMarginDeg);
+  const double high_deg = std::min(plain_deg + theta.high_rad * kDegPerRad - inside_deg, kLargestMarginDeg);
+  if (!(low_deg < high_deg)) return;
+  std::vector<double> margins_deg{std::clamp(asked.phase_margin_deg, low_deg, high_deg)};
+  for (int i = 0; i <= kMargins; ++i) margins_deg.push_back(low_deg + i * (high_deg - low_deg) / kMargins);
+  std::ranges::sort(margins_deg, {}, [&](double margin) { return std::abs(margin - asked.phase_margin_deg); });
+  const std::string kept = asked.mu ? "same mu" : "iso-damped";
+  for (const double margin_deg : margins_deg) {
+    TuningSpec spec = asked;
+    spec.phase_margin_deg = margin_deg;
+    add_offer(plant, spec, kept + ", same crossover, nearest phase margin", tuning.nearest);
+    if (!tuning.nearest.empty()) return;
+  }
+}
+
+void add_relaxed(const MeasuredPlant& plant, const TuningSpec& asked, MeasuredTuning& tuning) {
+  const TuningDemand demand = demand_of(plant.at_crossover(), plant.phase_fall, asked.phase_margin_deg);
+  for (const auto& [mu, name] : relaxed_orders(demand, asked)) {
+    TuningSpec spec = asked;
+    spec.mu = mu;
+    add_offer(plant, spec, name, tuning.relaxed);
+  }
+}
+
+std::string refusal_of(const MeasuredPlant& plant, const TuningSpec& spec, const TuningDemand& demand) {
+  if (!feasible_theta(spec.mu, demand.phase_fall).contains(demand.theta_rad)) {
+    return why_no_solution(spec, demand.theta_rad * kDegPerRad, demand.phase_fall);
+  }
+  const double mu = spec.mu ? *spec.mu : iso_damping_mu(demand);
+  const auto controller = controller_for(demand, mu);
+  return controller ? why_not_sound(plant, *controller) : why_no_controller(spec, demand, mu);
+}
+
 void add_sigmas(const MeasuredPlant& plant, MeasuredTuning& tuning) {
   const MeasuredPoint& at = plant.at_crossover();
   const double slope = std::abs(gain_slope(plant, *tuning.controller));
@@ -75,16 +135,14 @@ MeasuredTuning tune_measured(const MeasuredPlant& plant, const TuningSpec& spec)
   const TuningDemand demand = demand_of(plant.at_crossover(), plant.phase_fall, spec.phase_margin_deg);
   tuning.theta_deg = demand.theta_rad * kDegPerRad;
   tuning.phase_fall = demand.phase_fall;
-  if (!feasible_theta(spec.mu, demand.phase_fall).contains(demand.theta_rad)) {
-    tuning.reason = why_no_solution(spec, tuning.theta_deg, tuning.phase_fall);
-    return tuning;
+  tuning.controller = sound_controller(plant, spec);
+  if (tuning.controller) {
+    add_sigmas(plant, tuning);
+  } else {
+    tuning.reason = refusal_of(plant, spec, demand);
+    add_nearest(plant, spec, tuning);
+    add_relaxed(plant, spec, tuning);
   }
-  const double mu = spec.mu ? *spec.mu : iso_damping_mu(demand);
-  const auto controller = controller_for(demand, mu);
-  tuning.reason = controller ? why_not_sound(plant, *controller) : why_no_controller(spec, demand, mu);
-  if (!tuning.reason.empty()) return tuning;
-  tuning.controller = controller;
-  add_sigmas(plant, tuning);
   return tuning;
 }
 

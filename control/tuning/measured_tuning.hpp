@@ -13,15 +13,26 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "control/tuning/design.hpp"
 #include "control/tuning/three_tones.hpp"
 
 namespace control {
 
+// A specification at the measured crossover that has a solution, and its controller.
+struct MeasuredOffer {
+  std::string name;  // in words: what was kept and what was given up
+  TuningSpec spec;   // tuning to this returns this controller
+  FopdController controller;
+};
+
 struct MeasuredTuning {
   std::optional<FopdController> controller;
-  std::string reason;                    // if there is none
+  std::string reason;  // if there is none
+  // If there is none, what is, as tune offers it at the crossover that was measured: the nearest phase margin,
+  // iso-damped or with the fixed mu, and this phase margin with another mu. Empty where the plant was not measured.
+  std::vector<MeasuredOffer> nearest, relaxed;
   double theta_deg = 0, phase_fall = 0;  // θ and R
   // One sigma of what is achieved: that of the measurement, with the errors of the method that three_tones.hpp states,
   // the largest of ten fluids, in quadrature.

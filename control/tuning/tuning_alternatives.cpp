@@ -216,30 +216,37 @@ std::vector<TunedController> nearest_designs(const FractionalModel& plant, const
   return designs;
 }
 
+std::vector<RelaxedOrder> relaxed_orders(const TuningDemand& demand, const TuningSpec& spec) {
+  std::vector<RelaxedOrder> orders;
+  const auto add = [&orders](double mu, const char* name) {
+    if (mu >= kLowestMu && mu <= kHighestMu) orders.push_back({mu, name});
+  };
+  if (demand.theta_rad < 0 || demand.theta_rad >= pi) return orders;
+  if (demand.theta_rad < kPracticalMu * pi / 2 && spec.mu != kPracticalMu)
+    add(kPracticalMu, "iso-damping dropped, mu fixed at 0.9");
+  const bool is_iso_damped = demand.phase_fall < largest_phase_fall(demand.theta_rad);
+  if (is_iso_damped && spec.mu) {
+    add(iso_damping_mu(demand), "mu left free: iso-damped");
+  } else if (is_iso_damped) {
+    add(1, "iso-damping dropped: the classical PD");
+  } else if (demand.theta_rad < pi / 2 && spec.mu != 1) {
+    add(1, "iso-damping dropped, flattest phase with mu up to 1: the classical PD");  // (4) rises with mu
+  }
+  if (!is_iso_damped && demand.theta_rad > 0) {
+    add(iso_damping_mu(demand), "iso-damped with mu > 1: amplifies noise more than a derivative, not in the paper");
+  }
+  return orders;
+}
+
 std::vector<TunedController> relaxed_designs(const FractionalModel& plant, const TuningSpec& spec) {
   const PlantOnAxis on_axis{plant, spec.is_velocity_loop};
   const TuningDemand demand = tuning_demand(on_axis, std::log(spec.gain_crossover_rad_s), spec.phase_margin_deg);
   std::vector<TunedController> designs;
-  const auto offer = [&](double mu, const std::string& name) {
-    if (!(mu >= kLowestMu && mu <= kHighestMu)) return;
+  for (const auto& [mu, name] : relaxed_orders(demand, spec)) {
     TuningSpec with_mu = spec;
     with_mu.mu = mu;
     auto design = tuned_controller(plant, with_mu, mu, name);
     if (design && is_sound(*design)) designs.push_back(std::move(*design));
-  };
-  if (demand.theta_rad < 0 || demand.theta_rad >= pi) return designs;
-  if (demand.theta_rad < kPracticalMu * pi / 2 && spec.mu != kPracticalMu)
-    offer(kPracticalMu, "iso-damping dropped, mu fixed at 0.9");
-  const bool is_iso_damped = demand.phase_fall < largest_phase_fall(demand.theta_rad);
-  if (is_iso_damped && spec.mu) {
-    offer(iso_damping_mu(demand), "mu left free: iso-damped");
-  } else if (is_iso_damped) {
-    offer(1, "iso-damping dropped: the classical PD");
-  } else if (demand.theta_rad < pi / 2 && spec.mu != 1) {
-    offer(1, "iso-damping dropped, flattest phase with mu up to 1: the classical PD");  // (4) rises with mu
-  }
-  if (!is_iso_damped && demand.theta_rad > 0) {
-    offer(iso_damping_mu(demand), "iso-damped with mu > 1: amplifies noise more than a derivative, not in the paper");
   }
   return designs;
 }

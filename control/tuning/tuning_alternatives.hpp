@@ -23,6 +23,14 @@ std::optional<TunedController> tuned_controller(const FractionalModel& plant, co
 // does not matter.
 std::vector<PhaseMarginRange> sound_phase_margins(const FractionalModel& plant, const TuningSpec& spec);
 
+// A mu that gives up less than the specification asks for, at its crossover and phase margin, and the name of that.
+struct RelaxedOrder {
+  double mu = 0;
+  std::string name;
+};
+
+std::vector<RelaxedOrder> relaxed_orders(const TuningDemand& demand, const TuningSpec& spec);
+
 std::vector<TunedController> nearest_designs(const FractionalModel& plant, const TuningSpec& spec);
 std::vector<TunedController> relaxed_designs(const FractionalModel& plant, const TuningSpec& spec);
 

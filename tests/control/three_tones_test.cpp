@@ -214,19 +214,25 @@ TEST(ThreeTones, RefuseWhatTheRecordDoesNotShow) {
   EXPECT_THROW(measure_three_tones({rest, rest}, 200), std::invalid_argument);
 }
 
-// The same equations as tune's: with exact numbers the same controller.
-TEST(MeasuredTuning, IsThatOfTheModelForExactNumbers) {
+constexpr double kCrossover = 3;
+
+MeasuredPlant exactly_measured(const FractionalModel& model) {
   MeasuredPlant plant;
-  constexpr double kCrossover = 3;
   for (std::size_t i = 0; i < 3; ++i) {
     MeasuredPoint& point = plant.points[i];
     point.omega_rad_s = three_tones_rad_s(kCrossover)[i];
-    const Truth truth = truth_of(kNonNewtonianModel, point.omega_rad_s);
+    const Truth truth = truth_of(model, point.omega_rad_s);
     point.modulus = truth.modulus;
     point.phase_rad = truth.phase_rad;
     point.sigma = 0.01;
     if (i == 1) plant.phase_fall = truth.phase_fall;
   }
+  return plant;
+}
+
+// The same equations as tune's: with exact numbers the same controller.
+TEST(MeasuredTuning, IsThatOfTheModelForExactNumbers) {
+  MeasuredPlant plant = exactly_measured(kNonNewtonianModel);
   plant.phase_fall_sigma = 0.02;
   const TuningSpec spec{kCrossover, 90, {}, false};
   const MeasuredTuning found = tune_measured(plant, spec);
@@ -246,14 +252,49 @@ TEST(MeasuredTuning, IsThatOfTheModelForExactNumbers) {
   const MeasuredTuning infeasible = tune_measured(plant, {kCrossover, 60, {}, false});
   EXPECT_FALSE(infeasible.controller);
   EXPECT_EQ(infeasible.reason, tune(kNonNewtonianModel, {kCrossover, 60, {}, false}).reason);
+  const TunedController nearest_by_model = tune(kNonNewtonianModel, {kCrossover, 60, {}, false}).nearest.at(0);
+  ASSERT_EQ(infeasible.nearest.size(), 1U);
+  EXPECT_EQ(infeasible.nearest[0].name, nearest_by_model.name);
+  EXPECT_NEAR(infeasible.nearest[0].spec.phase_margin_deg, nearest_by_model.spec.phase_margin_deg, 1e-6);
+  EXPECT_NEAR(infeasible.nearest[0].controller.kp / nearest_by_model.controller.kp, 1, 1e-6);
   EXPECT_THROW(tune_measured(plant, {4, 90, {}, false}), std::invalid_argument);
 
   MeasuredPlant resonant = plant;
   resonant.points[2].modulus = 3 * plant.points[1].modulus;
   EXPECT_THAT(tune_measured(resonant, spec).reason, HasSubstr("the loop would cross over elsewhere"));
+  EXPECT_TRUE(tune_measured(resonant, spec).nearest.empty())
+      << "its gain is above 1 at the upper tone with every margin";
   MeasuredPlant unseen;
   unseen.refusal = "too short";
   EXPECT_EQ(tune_measured(unseen, spec).reason, "too short");
+  EXPECT_TRUE(tune_measured(unseen, spec).nearest.empty());
+}
+
+// Every specification, iso-damped or with a fixed mu: what is refused comes with what can be reached, and that is
+// granted.
+TEST(MeasuredTuning, ARefusalNamesWhatCanBeReached) {
+  const MeasuredPlant plant = exactly_measured(kNonNewtonianModel);
+  int refused = 0;
+  for (const std::optional<double> mu : {std::optional<double>{}, {0.3}, {0.9}, {1.2}}) {
+    for (double margin_deg = 5; margin_deg < 180; margin_deg += 12.5) {
+      SCOPED_TRACE(testing::Message() << margin_deg << " degrees, mu " << mu.value_or(0));
+      const MeasuredTuning found = tune_measured(plant, {kCrossover, margin_deg, mu, false});
+      if (found.controller) {
+        EXPECT_TRUE(found.nearest.empty() && found.relaxed.empty());
+        continue;
+      }
+      ++refused;
+      EXPECT_FALSE(found.nearest.empty()) << found.reason;
+      for (const auto* offers : {&found.nearest, &found.relaxed}) {
+        for (const MeasuredOffer& offer : *offers) {
+          const MeasuredTuning again = tune_measured(plant, offer.spec);
+          ASSERT_TRUE(again.controller) << offer.name << ": " << again.reason;
+          EXPECT_EQ(again.controller->kp, offer.controller.kp);
+        }
+      }
+    }
+  }
+  EXPECT_GT(refused, 10);
 }
 
 }  // namespace

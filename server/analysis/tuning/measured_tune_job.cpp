@@ -48,6 +48,17 @@ void add_controller(const MeasuredTuneRequest& request, const control::MeasuredT
   if (request.duty_max) answer["discretised"]["duty_max"] = *request.duty_max;
 }
 
+OrderedJson offers_json(const std::vector<control::MeasuredOffer>& offers) {
+  OrderedJson out = OrderedJson::array();
+  for (const auto& [name, spec, controller] : offers) {
+    OrderedJson offer{
+        {"name", name}, {"crossover_rad_s", spec.gain_crossover_rad_s}, {"phase_margin_deg", spec.phase_margin_deg}};
+    offer.update(json_of(controller));
+    out.push_back(std::move(offer));
+  }
+  return out;
+}
+
 Result<std::string> compute(const RunSamples& samples, const MeasuredTuneRequest& request, storage::JobRun& run) {
   const auto recorded = recording_of(samples, request.window, ChannelChoice::robot);
   if (!recorded) return std::unexpected{recorded.error()};
@@ -79,7 +90,9 @@ Result<std::string> compute(const RunSamples& samples, const MeasuredTuneRequest
                       {{"crossover_rad_s", request.spec.gain_crossover_rad_s},
                        {"phase_margin_deg", request.spec.phase_margin_deg},
                        {"mu", or_null(request.spec.mu)}}},
-                     {"warnings", recorded->warnings}};
+                     {"warnings", recorded->warnings},
+                     {"nearest_all", offers_json(tuned.nearest)},
+                     {"relaxed", offers_json(tuned.relaxed)}};
   run.report(0.6, "discretising");
   if (tuned.controller) add_controller(request, tuned, answer);
   return answer.dump();
