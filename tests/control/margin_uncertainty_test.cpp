@@ -50,7 +50,7 @@ void expect_spread_of_draws(const OpenLoop& loop, double dead_time_sd_s = 0) {
   const Eigen::MatrixXd root = covariance_of(known).llt().matrixL();
   std::mt19937 random{4};
   std::normal_distribution<double> normal;
-  Spread margin_deg, crossover_rad_s;
+  Spread margin_deg, crossover_rad_s, slope_deg_s;
   for (int i = 0; i < 2000; ++i) {
     const Eigen::VectorXd by = root * Eigen::VectorXd::NullaryExpr(5, [&] { return normal(random); });
     OpenLoop drawn = loop;
@@ -60,10 +60,12 @@ void expect_spread_of_draws(const OpenLoop& loop, double dead_time_sd_s = 0) {
     const Margins found = margins(drawn);
     margin_deg.add(*found.phase_margin_deg - *middle.phase_margin_deg);
     crossover_rad_s.add(*found.gain_crossover_rad_s - *middle.gain_crossover_rad_s);
+    slope_deg_s.add(*found.phase_slope_deg_per_rad_s - *middle.phase_slope_deg_per_rad_s);
   }
   const MarginUncertainty sd = margin_uncertainty(loop, *middle.gain_crossover_rad_s, known);
   EXPECT_NEAR(sd.phase_margin_deg / margin_deg.sd(), 1, 0.07);
   EXPECT_NEAR(sd.gain_crossover_rad_s / crossover_rad_s.sd(), 1, 0.07);
+  EXPECT_NEAR(sd.phase_slope_deg_per_rad_s / slope_deg_s.sd(), 1, 0.07);
 }
 
 TEST(MarginUncertainty, IsTheSpreadOverPlantsThatAreDrawn) {
@@ -74,6 +76,7 @@ TEST(MarginUncertainty, IsTheSpreadOverPlantsThatAreDrawn) {
   const OpenLoop loop{late, tune(late, {3, 80, 0.8, false}).tuned->controller, false};
   expect_spread_of_draws(loop);
   expect_spread_of_draws(loop, 0.01);
+  expect_spread_of_draws({kNonNewtonianModel, tune(kNonNewtonianModel, {3, 90}).tuned->controller, false});
 }
 
 // That is what iso-damping is for.

@@ -19,6 +19,7 @@ void add_margin_sigmas(const control::FractionalModel& plant, const control::Tun
   OrderedJson& achieved = answer["achieved"];
   achieved["phase_margin_sigma_deg"] = sigmas ? OrderedJson(sigmas->phase_margin_deg) : OrderedJson{};
   achieved["crossover_sigma_rad_s"] = sigmas ? OrderedJson(sigmas->gain_crossover_rad_s) : OrderedJson{};
+  achieved["phase_slope_sigma_deg_per_rad_s"] = sigmas ? OrderedJson(sigmas->phase_slope_deg_per_rad_s) : OrderedJson{};
 }
 
 void add_plant_doubts(const ModelDoubts& known, OrderedJson& answer) {

@@ -81,7 +81,7 @@ void write_ranges(std::ostream& out, const Tune& options, const Ranges& ranges) 
              ranges_in_words(ranges));
 }
 
-// ± 2 sd of margin and crossover, or that they are not known; nothing for the paper's models.
+// ± 2 sd of margin, crossover and phase slope, or that they are not known; nothing for the paper's models.
 void write_margin_sigmas(std::ostream& out, const PlantChoice& choice, const Plant& plant,
                          const control::TuningResult& result) {
   if (!choice.file || *choice.file == "newtonian" || *choice.file == "non_newtonian") return;
@@ -90,8 +90,11 @@ void write_margin_sigmas(std::ostream& out, const PlantChoice& choice, const Pla
     fmt::print(out, "the sigmas of the plant's parameters are not known: the margin takes them as exact\n");
     return;
   }
-  fmt::print(out, "by the sigmas of the plant's fit (± 2 sd): phase margin ± {} deg, gain crossover ± {} rad/s\n",
-             cell(2 * sigmas->phase_margin_deg, 2), cell(2 * sigmas->gain_crossover_rad_s, 2));
+  fmt::print(out,
+             "by the sigmas of the plant's fit (± 2 sd): phase margin ± {} deg, gain crossover ± {} rad/s, "
+             "phase slope ± {} deg/(rad/s)\n",
+             cell(2 * sigmas->phase_margin_deg, 2), cell(2 * sigmas->gain_crossover_rad_s, 2),
+             cell(2 * sigmas->phase_slope_deg_per_rad_s, 2));
 }
 
 analysis::OrderedJson answer_of(const Tune& options, const Plant& plant, const control::TuningResult& result,

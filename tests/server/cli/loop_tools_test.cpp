@@ -194,6 +194,9 @@ TEST_F(LoopTools, TuneSaysHowUncertainTheMarginIsByTheSigmasOfAFit) {
   const double sigma_deg = achieved["phase_margin_sigma_deg"];
   EXPECT_GT(sigma_deg, 0.1);
   EXPECT_GT(achieved["crossover_sigma_rad_s"], 0.01);
+  const double slope_deg = achieved["phase_slope_sigma_deg_per_rad_s"];
+  EXPECT_THAT(ask("tune --plant @fit.json" + spec).text,
+              HasSubstr(fmt::format("phase slope ± {:.2g} deg/(rad/s)", 2 * slope_deg)));
   EXPECT_THAT(ask("tune --plant @fit.json" + spec).text,
               HasSubstr(fmt::format("(± 2 sd): phase margin ± {:.2g} deg, gain crossover ± ", 2 * sigma_deg)));
   save("fit.json", fit_file("null"));

@@ -69,6 +69,7 @@ export interface Achieved {
   mt: number;
   gain_margin_db: number | null;
   is_closed_loop_stable: boolean;
+  phase_slope_sigma_deg_per_rad_s?: number | null;
   phase_margin_sigma_deg?: number | null; // by the sigmas of the model's fit; null: not known
   crossover_sigma_rad_s?: number | null;
 }

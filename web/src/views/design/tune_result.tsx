@@ -65,7 +65,9 @@ export function Achievement({ asked, tuned, own, is_dragged, on_ask }: Achieveme
             name="Phase slope, °/(rad/s)"
             asked="0"
             of={[achieved, sampled]}
-            text={({ phase_slope_deg_per_rad_s }) => fixed_text(phase_slope_deg_per_rad_s, 4)}
+            text={(margins) =>
+              uncertain_text(margins.phase_slope_deg_per_rad_s, margins.phase_slope_sigma_deg_per_rad_s, 4)
+            }
           />
           <Line
             name="Ms, Mt"
