@@ -72,7 +72,8 @@ std::string in_words(const Doubt& doubt) {
     case DoubtCode::parameter_not_determined:
       return doubt.parameter + " is not determined: one sigma is " +
              (doubt.value ? rounded(value, 2) : std::string{"without bound"});
-    case DoubtCode::parameter_at_bound: return doubt.parameter + " = " + rounded(value, 6) + " lies at its bound";
+    case DoubtCode::parameter_at_bound:
+      return doubt.parameter + " = " + rounded(value, 6) + " lies at its bound, where its sigma means little";
     case DoubtCode::dead_time_not_determined:
       return doubt.value ? "the age of the readings hides a part of the dead time: one sigma of it is " +
                                rounded(1e3 * value, 2) + " ms"

@@ -87,6 +87,9 @@ TEST_F(Reference, UncertaintyIsTheReferenceOne) {
       EXPECT_NEAR(fit.model.alpha, 1.7263, 4 * *fit.one_sigma[3]);
     } else {
       EXPECT_THAT(found.warnings, Contains(HasSubstr("lies at its bound 2")));
+      const auto at_bound = std::ranges::find(found.doubts, DoubtCode::parameter_at_bound, &Doubt::code);
+      ASSERT_NE(at_bound, found.doubts.end());
+      EXPECT_EQ(in_words(*at_bound), "alpha = 2 lies at its bound, where its sigma means little");
     }
   }
 }

@@ -5,6 +5,7 @@
 #include <fmt/ostream.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdio>
@@ -154,11 +155,19 @@ void write_sensor(std::ostream& out, const control::SensorFit& sensor) {
 }
 
 void write_parameters(std::ostream& out, const Fit& fit, bool is_of_one_run) {
-  Table table{{text(fit.structure), "value", "one sigma"}};
+  const std::vector<std::size_t> at_bound = control::parameters_at_bound(fit);
+  std::vector<std::string> head{text(fit.structure), "value", "one sigma"};
+  if (!at_bound.empty()) head.emplace_back("<that sigma");
+  Table table{std::move(head)};
   const auto values = values_of(fit.model);
   for (std::size_t i = 0; i < kParameters; ++i) {
     if (i == 1 && fit.model.b1 == 0) continue;
-    table.row({kParameterNames[i], cell(values[i], 8), cell(fit.one_sigma[i], 3)});
+    std::vector<std::string> row{kParameterNames[i], cell(values[i], 8), cell(fit.one_sigma[i], 3)};
+    if (!at_bound.empty()) {
+      const bool is_at_bound = std::ranges::find(at_bound, i) != at_bound.end();
+      row.emplace_back(is_at_bound ? "means little: the parameter lies at its bound" : "");
+    }
+    table.row(std::move(row));
   }
   table.write(out);
   const std::string offset = is_of_one_run ? fmt::format("offset {} m, ", cell(fit.offset_m, 4)) : std::string{};

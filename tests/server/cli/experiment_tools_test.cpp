@@ -156,6 +156,14 @@ TEST_F(Identifying, SaysWhetherTheRobotsEstimatorCanUseIt) {
   EXPECT_FALSE(refused.contains("model_gain_m_s"));
 }
 
+TEST_F(Identifying, MarksTheSigmaOfAnOrderAtItsBound) {
+  save("swing.json", R"({"kp":0.1,"b1":0.01,"b2":0.05,"alpha":2,"beta":1})");
+  save("swing.csv", ask("step --plant @swing.json --every-s 0.01 --until-s 3 --csv").text);
+  const std::string text = ask("identify --csv @swing.csv --structure fractional").text;
+  EXPECT_THAT(text, testing::ContainsRegex("alpha +2 +[^ ]+ +means little: the parameter lies at its bound"));
+  EXPECT_THAT(ask("identify --csv @swing.csv --structure second_order").text, Not(HasSubstr("means little")));
+}
+
 TEST_F(Identifying, WarnsOfACsvThatBeginsInMotion) {
   std::istringstream whole{ask("step --duty 0.3 --every-s 0.01 --until-s 5 --csv").text};
   std::string late, line;

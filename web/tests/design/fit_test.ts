@@ -110,6 +110,7 @@ test('how well a parameter is known is said in words', () => {
   expect(knowledge_text(0.1, 0.005)).toBe('roughly known, to 5 %');
   expect(knowledge_text(0.0068, 0.0022)).toBe('hardly known, to 32 %');
   expect(knowledge_text(2, null)).toBe('fixed by the structure');
+  expect(knowledge_text(2, 0.003, true)).toBe('at its bound, where its ± means little');
 });
 
 test('what a fit is worth is said in sentences', () => {

@@ -51,6 +51,7 @@ export interface FitOfRun extends Quality {
 
 export interface Identified extends Fit {
   warnings: string[];
+  doubts?: { code: string; parameter?: string }[];
   compared: Fit[];
   channels: string[];
   channels_reason?: string;

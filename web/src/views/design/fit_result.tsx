@@ -58,6 +58,9 @@ export function FitResult({ session, work, design, fit }: FitResultProps) {
   );
 }
 
+const is_at_bound = (fit: Identified, name: string) =>
+  (fit.doubts ?? []).some(({ code, parameter }) => code === 'parameter_at_bound' && parameter === name);
+
 function Parameters({ fit }: { fit: Identified }) {
   return (
     <table class="design-table" id="design-parameters">
@@ -83,7 +86,7 @@ function Parameters({ fit }: { fit: Identified }) {
               )}
             </th>
             <td class="value">{with_sigma(fit.parameters[name], fit.one_sigma[name])}</td>
-            <td class="quiet">{knowledge_text(fit.parameters[name], fit.one_sigma[name])}</td>
+            <td class="quiet">{knowledge_text(fit.parameters[name], fit.one_sigma[name], is_at_bound(fit, name))}</td>
           </tr>
         ))}
         {fit.dead_time_s > 0 && (
