@@ -90,11 +90,13 @@ struct SensorFit {
   double period_s = 0;                  // of its samples, by the robot's clock
   double clock_off = 0;                 // by how much that is longer than the robot's period, relative
   double time_constant_s = 0;           // of its low pass
-  double delay_s = 0;                   // of a reading, in the mean, the low pass aside
-  bool delay_is_at_limit = false;       // of what was searched
-  double bias_m_s2 = 0;                 // in the mean; of recovered readings but for a constant
-  double bias_range_m_s2 = 0;           // how far it wandered
-  std::size_t readings_left_out = 0;    // read twice, failed, of uncertain age, or of ticks that do not count
+  // Delay of a reading, in the mean, the low pass aside. The dead time of a model that identify() found is part of it;
+  // that of a model given to evaluate() is not.
+  double delay_s = 0;
+  bool delay_is_at_limit = false;     // of what was searched
+  double bias_m_s2 = 0;               // in the mean; of recovered readings but for a constant
+  double bias_range_m_s2 = 0;         // how far it wandered
+  std::size_t readings_left_out = 0;  // read twice, failed, of uncertain age, or of ticks that do not count
 };
 
 // Absent parameters (b1 of first order, the orders of integer structures) have no sigma and correlation 0.

@@ -90,9 +90,12 @@ TEST(SensorSearch, SaysHowMuchDeadTimeTheAgeOfTheReadingsMayHide) {
 TEST(SensorSearch, ADeadTimeIsWhatTheSensorsOwnLagDoesNotExplain) {
   const Identification unknown = identified(0.03, 0.2, std::nullopt);
   EXPECT_NEAR(unknown.best.model.dead_time_s, 0.03, 0.003);
+  EXPECT_NEAR(unknown.best.sensor->delay_s, unknown.best.model.dead_time_s + 0.005, 1e-9)
+      << "the sum, with the mean age";
   EXPECT_THAT(unknown.warnings, Contains(HasSubstr("ms were attributed to the plant; give the sensor's own lag")));
   const Identification known = identified(0.03, 0.2, 0.01);
   EXPECT_NEAR(known.best.model.dead_time_s, 0.02, 0.003);
+  EXPECT_NEAR(known.best.sensor->delay_s, known.best.model.dead_time_s + 0.01 + 0.005, 1e-9);
   EXPECT_THAT(known.warnings, Not(Contains(HasSubstr("cannot be told"))));
 }
 

@@ -143,12 +143,16 @@ control::Identification search(const Identify& options, std::span<const analysis
                           : analysis::identify_runs(runs, settings);
 }
 
-void write_sensor(std::ostream& out, const control::SensorFit& sensor) {
+// The delay of a fit's readings has the model's dead time in it.
+void write_sensor(std::ostream& out, const control::SensorFit& sensor, double dead_time_s) {
   const std::string clock =
       sensor.has_own_clock ? fmt::format("a clock of its own, a sample each {} ms", fixed(1e3 * sensor.period_s, 4))
                            : std::string{"in step with the ticks"};
-  fmt::print(out, "sensor: {}; readings {} ms late in the mean and by a low pass of {} ms; {} left out\n", clock,
-             fixed(1e3 * sensor.delay_s, 2), fixed(1e3 * sensor.time_constant_s, 2), sensor.readings_left_out);
+  const std::string with_dead_time =
+      dead_time_s > 0 ? fmt::format(", the dead time of {} ms included,", fixed(1e3 * dead_time_s, 2)) : std::string{};
+  fmt::print(out, "sensor: {}; readings {} ms late in the mean{} and by a low pass of {} ms; {} left out\n", clock,
+             fixed(1e3 * sensor.delay_s, 2), with_dead_time, fixed(1e3 * sensor.time_constant_s, 2),
+             sensor.readings_left_out);
   fmt::print(out, "its bias wandered by {} m/s²; {}\n", cell(sensor.bias_range_m_s2, 2),
              sensor.readings_are_recovered ? "its readings are recovered from the record, without the robot's own bias"
                                            : "the robot's own bias is still in the record, and fitted as a bias");
@@ -178,7 +182,7 @@ void write_parameters(std::ostream& out, const Fit& fit, bool is_of_one_run) {
                                                    : "look white";
   fmt::print(out, "residuals {} (p = {}); {} after {} iterations; {} of {} starts agree\n", residuals,
              cell(fit.whiteness_p_value, 3), text(fit.end), fit.iterations, fit.starts_that_agree, fit.starts);
-  if (fit.sensor) write_sensor(out, *fit.sensor);
+  if (fit.sensor) write_sensor(out, *fit.sensor, fit.model.dead_time_s);
   if (fit.position_clock_sigma_s) {
     fmt::print(out, "clock of the position from outside: {} ms late, one sigma {} ms\n",
                fixed(1e3 * fit.position_clock_s, 2), cell(1e3 * *fit.position_clock_sigma_s, 2));
@@ -215,7 +219,7 @@ void write_run(std::ostream& out, const analysis::RunOfMany& of, const Fit& fit)
              of.recorded.channels_reason);
   fmt::print(out, "fit {} %, residual sd {}; offset {} m\n", fixed(fit.fit_percent, 3), cell(fit.residual_sd, 4),
              cell(fit.offset_m, 4));
-  if (fit.sensor) write_sensor(out, *fit.sensor);
+  if (fit.sensor) write_sensor(out, *fit.sensor, fit.model.dead_time_s);
 }
 
 void write_text(std::ostream& out, std::span<const analysis::RunOfMany> runs, const control::Identification& found) {
