@@ -37,9 +37,12 @@ void add_residuals(const Fit& fit, const std::optional<ScoreEvidence>& amplitude
   if (fit.drift_factor > 1) doubts.push_back({DoubtCode::residuals_drift, fit.drift_factor, {}, fit.drift_factor});
 }
 
+// With all digits before the point: 100, not 1e+02.
 std::string rounded(double value, int digits) {
+  const double size = std::abs(value) * (1 + 0.5 * std::pow(10, -digits));
+  const bool is_plain = size >= 1 && size < 1e6;
   std::ostringstream text;
-  text.precision(digits);
+  text.precision(is_plain ? std::max(digits, static_cast<int>(std::log10(size)) + 1) : digits);
   text << value;
   return text.str();
 }
@@ -81,7 +84,7 @@ std::string in_words(const Doubt& doubt) {
     case DoubtCode::dead_zone:
       return "the motor stands still below a duty of about " + rounded(value, 2) +
              ", which the model does not hold: set the robot's dead_zone_duty";
-    case DoubtCode::part_of_run_used: return "the fit used " + rounded(100 * value, 2) + " % of the run";
+    case DoubtCode::part_of_run_used: return "the fit used " + rounded(100 * value, 4) + " % of the run";
   }
   return "a doubt that this version does not know";
 }

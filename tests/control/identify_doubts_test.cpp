@@ -261,5 +261,16 @@ TEST(IdentifyDoubts, ResidualsThatAreNoNumbersAreNotWhite) {
   EXPECT_EQ(whiteness_p_value(residual), 0);
 }
 
+TEST(IdentifyDoubts, SharesAreNumbersThatAPersonReads) {
+  const auto used = [](double share) { return in_words({DoubtCode::part_of_run_used, share}); };
+  EXPECT_EQ(used(0.99868), "the fit used 99.87 % of the run");
+  EXPECT_EQ(used(0.66), "the fit used 66 % of the run");
+  for (const double share : {0.04, 0.994, 0.9951, 0.99999, 1.0}) {
+    const std::string words = in_words({DoubtCode::runs_disagree, share});
+    EXPECT_THAT(words, Not(HasSubstr("e+"))) << share;
+  }
+  EXPECT_THAT(in_words({DoubtCode::residuals_not_white, 123.4}), HasSubstr("by a factor of 123"));
+}
+
 }  // namespace
 }  // namespace control
