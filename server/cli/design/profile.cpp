@@ -33,7 +33,7 @@ struct Predicted {
   Variant variant;
   TimeLine line;
   Preview preview;
-  std::vector<double> position_sd_m;  // of the model's parameters; empty: not known
+  std::optional<experiments::PositionBand> band;  // none: not known
 };
 
 // Repeats of a combination are the same, and are predicted once.
@@ -54,11 +54,18 @@ std::vector<Predicted> predict(const Profile& profile, const ProfileQuestion& op
     TimeLine line = experiments::time_line_of(profile, variant);
     const Profile of_run = experiments::profile_of_run(profile, variant);
     Preview preview = experiments::preview_of(of_run, line, plant.model, sections);
-    std::vector<double> sd_m;
+    std::optional<experiments::PositionBand> band;
     if (plant.uncertainty) {
-      sd_m = experiments::position_sd_of(of_run, line, plant.model, *plant.uncertainty, sections);
+      const bool is_in_doubt = !analysis::grave_doubts_in_words(plant.doubts).empty();
+      band = experiments::band_of({of_run,
+                                   line,
+                                   plant.model,
+                                   *plant.uncertainty,
+                                   sections,
+                                   {},
+                                   experiments::estimate_with(plant.model, is_in_doubt)});
     }
-    runs.push_back({variant, std::move(line), std::move(preview), std::move(sd_m)});
+    runs.push_back({variant, std::move(line), std::move(preview), std::move(band)});
   }
   return runs;
 }
@@ -68,7 +75,7 @@ const char* kind_text(const experiments::Step& step) {
 }
 
 std::optional<double> largest_sd_m(const Predicted& run) {
-  return run.position_sd_m.empty() ? std::nullopt : std::optional{std::ranges::max(run.position_sd_m)};
+  return run.band ? std::optional{std::ranges::max(run.band->sd_m)} : std::nullopt;
 }
 
 OrderedJson json_of(const Predicted& run) {
@@ -107,7 +114,15 @@ void write_json(std::ostream& out, const Profile& profile, const std::vector<Pre
   OrderedJson setpoint_m = OrderedJson::array();
   for (const double value : preview.setpoint_m)
     setpoint_m.push_back(std::isnan(value) ? OrderedJson(nullptr) : OrderedJson(value));
-  const bool is_known = !chosen.position_sd_m.empty();
+  OrderedJson sd_m, parts_m, true_sd_m;
+  if (const auto& band = chosen.band) {
+    sd_m = band->sd_m;
+    parts_m = {{"parameters", band->parameters_m},
+               {"estimator", band->estimator_m},
+               {"sensor", band->sensor_m},
+               {"start", band->start_m}};
+    true_sd_m = band->true_sd_m;
+  }
   cli::write_json(out, {{"name", profile.name},
                         {"purpose", profile.purpose},
                         {"until", profile.until ? OrderedJson(text(*profile.until)) : OrderedJson(nullptr)},
@@ -115,7 +130,9 @@ void write_json(std::ostream& out, const Profile& profile, const std::vector<Pre
                         {"runs", std::move(all)},
                         {"t_s", preview.time_s},
                         {"position_m", preview.position_m},
-                        {"position_sd_m", is_known ? OrderedJson(chosen.position_sd_m) : OrderedJson(nullptr)},
+                        {"position_sd_m", std::move(sd_m)},
+                        {"position_sd_parts_m", std::move(parts_m)},
+                        {"true_position_sd_m", std::move(true_sd_m)},
                         {"velocity_m_s", preview.velocity_m_s},
                         {"duty", preview.duty},
                         {"setpoint_m", std::move(setpoint_m)},
@@ -132,7 +149,7 @@ void write_problems(std::ostream& out, const std::vector<Predicted>& runs) {
 void write_choices(std::ostream& out, const Profile& profile, const std::vector<Predicted>& runs) {
   Table table{{"run", "step", "<kind", "duty ×", "duration (s)", "from (m)", "to (m)", "± 2 sd (m)", "travel (m)"}};
   for (std::size_t i = 0; i < runs.size(); ++i) {
-    const auto& [variant, line, preview, position_sd_m] = runs[i];
+    const auto& [variant, line, preview, band] = runs[i];
     const auto sd_m = largest_sd_m(runs[i]);
     table.row({std::to_string(i + 1), std::to_string(variant.step), kind_text(profile.steps[variant.step - 1]),
                cell(variant.duty_factor), fixed(line.duration_s(), 2), fixed(preview.position_min_m, 3),
@@ -160,7 +177,7 @@ void write_table(std::ostream& out, const Profile& profile, const std::vector<Pr
   Table table{{"run", "<fluid", "<controller", "duty ×", "setpoint ×", "duration (s)", "from (m)", "to (m)",
                "± 2 sd (m)", "travel (m)"}};
   for (std::size_t i = 0; i < runs.size(); ++i) {
-    const auto& [variant, line, preview, position_sd_m] = runs[i];
+    const auto& [variant, line, preview, band] = runs[i];
     const auto sd_m = largest_sd_m(runs[i]);
     table.row({std::to_string(i + 1), variant.fluid.empty() ? "any" : one_line(variant.fluid),
                variant.controller.empty() ? "in force" : one_line(variant.controller), cell(variant.duty_factor),
@@ -257,7 +274,7 @@ int run(const ProfileQuestion& options, std::ostream& out) {
                     {"velocity_m_s", preview.velocity_m_s},
                     {"position_m", preview.position_m},
                     {"setpoint_m", preview.setpoint_m},
-                    {"position_sd_m", chosen.position_sd_m.empty() ? unknown : chosen.position_sd_m}});
+                    {"position_sd_m", chosen.band ? chosen.band->sd_m : unknown}});
   } else if (options.form.is_json) {
     write_json(out, profile, runs, chosen);
   } else {

@@ -211,7 +211,13 @@ asio::awaitable<std::string> Conduct::predict(const TimeLine& line) {
   const station::RobotSettings* settings = parts_.driver.station.settings(experiment_.request.robot_id);
   if (settings == nullptr || !settings->controller) co_return std::string{};
   ModelInUse in_use = model_in_use();
-  PredictionRequest request{of_run_, line, in_use.model, in_use.model_of, in_use.uncertainty, *settings->controller};
+  PredictionRequest request{of_run_,
+                            line,
+                            in_use.model,
+                            in_use.model_of,
+                            in_use.uncertainty,
+                            *settings->controller,
+                            estimate_of(settings->parameters)};
   auto job = [request = std::move(request)]() -> std::string {
     try {
       return prediction_json(request);

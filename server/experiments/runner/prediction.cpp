@@ -1,5 +1,7 @@
 #include "server/experiments/runner/prediction.hpp"
 
+#include <fmt/format.h>
+
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <vector>
@@ -21,7 +23,51 @@ json thinned(const std::vector<double>& values, std::size_t every) {
   return list;
 }
 
+void add_band(const PredictionRequest& request, const control::ParallelSections& sections, std::size_t every,
+              json& out) {
+  for (const char* name : {"position_sd_m", "position_sd_parts_m", "true_position_sd_m"}) out[name] = nullptr;
+  if (!request.uncertainty || !request.estimate) return;
+  const PositionBand band = band_of({request.profile,
+                                     request.line,
+                                     request.model,
+                                     *request.uncertainty,
+                                     sections,
+                                     {request.controller.duty_min, request.controller.duty_max},
+                                     *request.estimate});
+  out["position_sd_m"] = thinned(band.sd_m, every);
+  out["position_sd_parts_m"] = {{"parameters", thinned(band.parameters_m, every)},
+                                {"estimator", thinned(band.estimator_m, every)},
+                                {"sensor", thinned(band.sensor_m, every)},
+                                {"start", thinned(band.start_m, every)}};
+  out["true_position_sd_m"] = thinned(band.true_sd_m, every);
+}
+
 }  // namespace
+
+std::optional<control::EstimateParameters> estimate_of(const station::ParameterTable& parameters) {
+  bool is_whole = true;
+  const auto value = [&](const std::string& name) {
+    const std::optional<float> reported = parameters.value(name);
+    is_whole = is_whole && reported;
+    return static_cast<double>(reported.value_or(0));
+  };
+  control::EstimateParameters estimate;
+  for (std::size_t i = 0; i < control::kEstimateSections; ++i) {
+    estimate.gain_m_s[i] = value(fmt::format("model_gain_{}_m_s", i + 1));
+    estimate.time_constant_s[i] = value(fmt::format("model_time_constant_{}_s", i + 1));
+  }
+  estimate.is_confirmed = value("model_confirmed") != 0;
+  estimate.gain_error = value("model_gain_error");
+  estimate.section_error = value("model_section_error");
+  estimate.shape_error = value("model_shape_error");
+  estimate.driven_velocity_m_s = value("driven_velocity_sd_m_s");
+  estimate.resting_velocity_m_s = value("resting_velocity_sd_m_s");
+  estimate.correlation_s = value("velocity_correlation_s");
+  estimate.noise_m_s2 = value("acceleration_noise_m_s2");
+  estimate.bias_m_s2 = value("acceleration_bias_m_s2");
+  estimate.bias_walk_m_s2 = value("acceleration_bias_walk_m_s2");
+  return is_whole ? std::optional{estimate} : std::nullopt;
+}
 
 std::string prediction_json(const PredictionRequest& request) {
   const control::ParallelSections sections = analysis::sections_of(request.controller);
@@ -33,12 +79,7 @@ std::string prediction_json(const PredictionRequest& request) {
   out["model_of"] = request.model_of;
   out["t_s"] = thinned(preview.time_s, every);
   out["position_m"] = thinned(preview.position_m, every);
-  out["position_sd_m"] = nullptr;
-  if (request.uncertainty) {
-    const std::vector<double> sd_m =
-        position_sd_of(request.profile, request.line, request.model, *request.uncertainty, sections);
-    out["position_sd_m"] = thinned(sd_m, every);
-  }
+  add_band(request, sections, every, out);
   out["velocity_m_s"] = thinned(preview.velocity_m_s, every);
   out["duty"] = thinned(preview.duty, every);
   out["setpoint_m"] = thinned(preview.setpoint_m, every);

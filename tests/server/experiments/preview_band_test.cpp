@@ -24,7 +24,7 @@ control::ParallelSections proportional(double kp) {
 class PreviewBand : public ::testing::Test {
  protected:
   std::vector<double> position_sd_m(const control::ParallelSections& controller) const {
-    return position_sd_of(profile, line, kNonNewtonianModel, known, controller);
+    return parameters_sd_of(profile, line, kNonNewtonianModel, known, controller);
   }
   std::vector<double> position_m(const control::FractionalModel& model, const control::ParallelSections& controller) {
     return preview_of(profile, line, model, controller).position_m;
@@ -97,7 +97,7 @@ TEST_F(PreviewBand, AtTheEdgeOfWhatAModelMayBeTheOtherSideCounts) {
   control::FractionalModel edge = kNonNewtonianModel;
   edge.beta = 1;
   known.one_sigma[4] = 0.01;
-  const auto sd = position_sd_of(profile, line, edge, known, proportional(1));
+  const auto sd = parameters_sd_of(profile, line, edge, known, proportional(1));
   EXPECT_GT(sd.back(), 0);
   EXPECT_TRUE(std::ranges::all_of(sd, [](double each) { return std::isfinite(each); }));
 }
@@ -132,6 +132,51 @@ TEST_F(PreviewBand, OfADeadTimeAndParametersTheSquaresAddUp) {
 TEST_F(PreviewBand, OfAKnownModelIsZero) {
   use("figure_5");
   EXPECT_EQ(std::ranges::max(position_sd_m(proportional(1))), 0);
+}
+
+TEST_F(PreviewBand, IsMadeOfFourPartsWhoseSquaresAddUp) {
+  use("figure_7");
+  known.one_sigma[0] = 0.02 * kNonNewtonianModel.kp;
+  const BandRequest request{
+      profile, line, kNonNewtonianModel, known, proportional(10), {}, estimate_with(kNonNewtonianModel, false)};
+  const PositionBand band = band_of(request);
+  const std::size_t samples = position_m(kNonNewtonianModel, proportional(10)).size();
+  EXPECT_EQ(band.parameters_m, position_sd_m(proportional(10)));
+  for (const auto* part :
+       {&band.sd_m, &band.parameters_m, &band.estimator_m, &band.sensor_m, &band.start_m, &band.true_sd_m}) {
+    ASSERT_EQ(part->size(), samples);
+    EXPECT_TRUE(std::ranges::all_of(*part, [](double each) { return std::isfinite(each) && each >= 0; }));
+  }
+  for (const std::size_t k : {50U, 200U, 2050U, 4000U}) {
+    EXPECT_NEAR(band.sd_m[k],
+                std::hypot(std::hypot(band.parameters_m[k], band.estimator_m[k]),
+                           std::hypot(band.sensor_m[k], band.start_m[k])),
+                1e-12)
+        << k;
+  }
+  EXPECT_LT(band.sd_m.back(), 5e-5) << "the loop holds the position that it measures";
+  EXPECT_GT(band.true_sd_m.back(), 1e-3) << "and with it the error of the estimate";
+}
+
+TEST_F(PreviewBand, IsWiderWhereTheRobotsModelIsOnlyAssumed) {
+  use("figure_7");
+  BandRequest request{
+      profile, line, kNonNewtonianModel, known, proportional(10), {}, estimate_with(kNonNewtonianModel, false)};
+  const PositionBand confirmed = band_of(request);
+  request.estimate.is_confirmed = false;
+  const PositionBand assumed = band_of(request);
+  EXPECT_GT(assumed.estimator_m[100], 10 * confirmed.estimator_m[100]);
+  EXPECT_GT(assumed.true_sd_m.back(), 3 * confirmed.true_sd_m.back());
+}
+
+// With duty in [0, 0.2] all of the way to 0.1 m is clipped at 0.2: nothing but the gain decides how far it comes.
+TEST_F(PreviewBand, HasTheDutyRangeOfTheController) {
+  use("figure_7");
+  known.one_sigma[0] = 0.02 * kNonNewtonianModel.kp;
+  const DutyRange narrow{0, 0.2};
+  const auto sd = parameters_sd_of(profile, line, kNonNewtonianModel, known, proportional(100), narrow);
+  const auto clipped = preview_of(profile, line, kNonNewtonianModel, proportional(100), narrow.min, narrow.max);
+  for (const std::size_t k : {50U, 100U, 150U}) EXPECT_NEAR(sd[k], 0.02 * clipped.position_m[k], 1e-9) << k;
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <nlohmann/json.hpp>
 #include <vector>
 
@@ -87,6 +88,7 @@ TEST(Prediction, IsThatOfThePreviewWithTheControllerOfTheRobot) {
   const json told = json::parse(prediction_json(request));
   EXPECT_EQ(told["model_of"], "(29)");
   EXPECT_EQ(told["position_sd_m"], nullptr);
+  EXPECT_EQ(told["position_sd_parts_m"], nullptr);
   EXPECT_LE(told["t_s"].size(), kMostPredicted);
   EXPECT_EQ(told["t_s"].size(), told["position_m"].size());
   const Preview preview = preview_of(profile, request.line, request.model, analysis::sections_of(controller));
@@ -136,6 +138,28 @@ TEST(Prediction, RunsTheControllerAsTheRobotDoes) {
   control::SectionFilter filter{analysis::sections_of(controller)};
   const std::vector<double> duties = duties_of_robot(controller, 50);
   for (std::size_t k = 0; k < duties.size(); ++k) EXPECT_NEAR(filter.step(k == 0 ? 1 : 0), duties[k], 1e-6) << k;
+}
+
+TEST(Prediction, HasItsBandWithEachPartWhereModelAndRobotAreKnown) {
+  protocol::Controller controller = rheonaut_Controller_init_zero;
+  controller.kp = 5;
+  controller.duty_min = -1;
+  controller.duty_max = 1;
+  const Profile profile = profile_of("[[step]]\nkind = \"setpoint\"\nsetpoint_m = 0.1\nfor_s = 30\n");
+  control::ExpectedUncertainty known;
+  known.one_sigma[0] = 0.001;
+  PredictionRequest request{profile,   time_line_of(profile, {}), control::kNonNewtonianModel, "water", known,
+                            controller};
+  EXPECT_EQ(json::parse(prediction_json(request))["position_sd_m"], nullptr) << "the robot's parameters are not known";
+  EXPECT_FALSE(estimate_of(station::ParameterTable{}));
+  request.estimate.emplace().gain_m_s[0] = 0.1;
+  const json told = json::parse(prediction_json(request));
+  double variance_m2 = 0;
+  for (const char* part : {"parameters", "estimator", "sensor", "start"}) {
+    variance_m2 += std::pow(told["position_sd_parts_m"][part].at(100).get<double>(), 2);
+  }
+  EXPECT_NEAR(told["position_sd_m"].at(100).get<double>(), std::sqrt(variance_m2), 1e-12);
+  EXPECT_GT(told["true_position_sd_m"].back().get<double>(), told["position_sd_m"].back().get<double>());
 }
 
 TEST(OrderArguments, AreThoseOfTheBody) {

@@ -235,7 +235,8 @@ function RunPlot({ session, experiment, summary, run }: RunPlotProps) {
         <span class="track-key setpoint">setpoint</span> <span class="track-key duty">duty, predicted</span>
         <span class="quiet">
           {' '}
-          On the model {answer.model_of}, stored before the run{has_band ? '' : '; how sure it is, is not known'}
+          On the model {answer.model_of}, stored before the run
+          {has_band ? '; its band is of the position that the robot measures' : '; how sure it is, is not known'}
           {answer.ignores_flow ? '; without the flow of the pump' : ''}.
           {measured && Number.isFinite(measured.until_s)
             ? ` Measured up to ${measured.until_s.toFixed(1)} s, where the run was interrupted; what came later was not predicted.`
