@@ -49,7 +49,9 @@ std::string rounded(double value, int digits) {
 
 }  // namespace
 
-bool is_grave(const Doubt& doubt) { return !doubt.widening || *doubt.widening > kGraveWidening; }
+bool is_grave(const Doubt& doubt) {
+  return !doubt.widening || *doubt.widening > kGraveWidening || doubt.code == DoubtCode::dead_zone;
+}
 
 std::string in_words(const Doubt& doubt) {
   const double value = doubt.value.value_or(0);

@@ -10,7 +10,8 @@
 // w is what the sd of the model's output over the run is multiplied by when the doubt is counted. White residuals of sd
 // s give that output an rms sd of s √(k/n); a share of their squares that the model could have explained is an error of
 // s √share beside it: (1). A doubt is grave if w > 2: by its size, never by a p-value alone. A fit whose sd nobody
-// knows (its search did not converge) has no w, and is grave. Errors: none thrown.
+// knows (its search did not converge) has no w, and is grave; so is a dead zone, which widens nothing that is computed
+// from the model, and makes it another motor's on a robot whose dead_zone_duty is not set. Errors: none thrown.
 #pragma once
 
 #include <optional>

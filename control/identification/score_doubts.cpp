@@ -259,6 +259,7 @@ std::optional<DeadZone> dead_zone_evidence(OutputErrorSearch& search, const Reco
   double most = kDoubtfulShare;
   std::optional<DeadZone> found;
   for (const DeadZone& zone : possible_dead_zones(recording.duty)) {
+    if (search.limit().end()) return std::nullopt;
     std::vector<double> below = recording.duty;
     const std::vector<double> driven = beyond_dead_zone(recording.duty, zone);
     for (std::size_t k = 0; k < below.size(); ++k) below[k] -= driven[k];

@@ -59,17 +59,21 @@ Error out_of_time(double time_limit_s) {
       {}};
 }
 
+using DeadZone = std::optional<control::DeadZone>;  // that the fit has found; on other data it is the motor's, too
+
 // The quality of a model on other data; the error: its time ran out.
 Result<OrderedJson> quality_on(const RunOfMany& run, const control::FractionalModel& model,
-                               const IdentifyRequest& request) {
-  const control::Fit fit = control::evaluate(model, run.recorded.recording, request.search);
+                               const IdentifyRequest& request, const DeadZone& zone) {
+  control::Recording recording = run.recorded.recording;
+  if (zone) recording.duty = control::beyond_dead_zone(std::move(recording.duty), *zone);
+  const control::Fit fit = control::evaluate(model, recording, request.search);
   if (is_out_of_time(fit)) return std::unexpected{out_of_time(request.search.time_limit_s)};
   return quality_json(fit);
 }
 
 Result<OrderedJson> validation_json(const RunOfMany& run, const control::FractionalModel& model,
-                                    const IdentifyRequest& request) {
-  auto answer = quality_on(run, model, request);
+                                    const IdentifyRequest& request, const DeadZone& zone) {
+  auto answer = quality_on(run, model, request, zone);
   if (!answer) return answer;
   (*answer)["run_id"] = run.run;
   (*answer)["channels"] = channels_of(run.recorded.recording);
@@ -78,16 +82,16 @@ Result<OrderedJson> validation_json(const RunOfMany& run, const control::Fractio
 
 // On one run as it always was; on several, one quality for each.
 Result<OrderedJson> in_use_json(std::span<const RunOfMany> runs, const ModelInUse& in_use,
-                                const IdentifyRequest& request) {
+                                const IdentifyRequest& request, const DeadZone& zone) {
   OrderedJson answer;
   if (runs.size() == 1) {
-    auto quality = quality_on(runs.front(), in_use.model, request);
+    auto quality = quality_on(runs.front(), in_use.model, request, zone);
     if (!quality) return quality;
     answer = std::move(*quality);
   } else {
     answer["runs"] = OrderedJson::array();
     for (const RunOfMany& run : runs) {
-      auto quality = validation_json(run, in_use.model, request);
+      auto quality = validation_json(run, in_use.model, request, zone);
       if (!quality) return quality;
       answer["runs"].push_back(std::move(*quality));
     }
@@ -123,10 +127,11 @@ Result<std::string> compute(std::span<const RunOfMany> runs, const RunOfMany* va
   run.report(1, "trying the model on other data");
   const bool has_model = std::isfinite(found.best.sse);
   const control::FractionalModel model = found.best.model;
+  const DeadZone zone = found.dead_zone;
   OrderedJson answer = found_json(runs, std::move(found), request);
   Result<OrderedJson> others = OrderedJson{}, of_in_use = OrderedJson{};
-  if (validation != nullptr && has_model) others = validation_json(*validation, model, request);
-  if (in_use && others) of_in_use = in_use_json(runs, *in_use, request);
+  if (validation != nullptr && has_model) others = validation_json(*validation, model, request, zone);
+  if (in_use && others) of_in_use = in_use_json(runs, *in_use, request, zone);
   for (const auto* tried : {&others, &of_in_use}) {
     if (!*tried) return std::unexpected{tried->error()};
   }

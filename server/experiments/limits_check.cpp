@@ -55,8 +55,10 @@ Result<void> check_limits(const Profile& profile, const config::Envelope& envelo
 
 Demands demands_of(const Profile& profile) {
   Demands demands;
-  const bool goes_back = profile.until && profile.conditions.start == StartPosition::back;
-  demands.longest_auto_s = goes_back ? kWayBack_s : profile.until ? 0 : longest_auto_s(profile);
+  const bool goes_back = profile.conditions.start == StartPosition::back;
+  const bool has_several_runs = profile.until || variants_of(profile).size() > 1;
+  demands.longest_auto_s =
+      std::max(profile.until ? 0 : longest_auto_s(profile), goes_back && has_several_runs ? kWayBack_s : 0);
   for (const Variant& variant : variants_of(profile)) {
     if (variant.repeat > 1) continue;
     const TimeLine line = time_line_of(profile, variant);
@@ -65,6 +67,10 @@ Demands demands_of(const Profile& profile) {
       if (action.kind == ActionKind::duty && action.value < demands.duty_min) {
         demands.duty_min = action.value;
         demands.duty_step = step;
+      }
+      if (action.kind == ActionKind::disturbance && std::abs(action.value) > demands.disturbance_max_m) {
+        demands.disturbance_max_m = std::abs(action.value);
+        demands.disturbance_step = step;
       }
       if (action.kind != ActionKind::setpoint) continue;
       if (action.value < demands.setpoint_min_m) {
@@ -90,11 +96,17 @@ Result<void> check_demands(const Demands& demands, const RobotLimits& limits) {
   if (demands.duty_min < 0 && !limits.has_reverse) {
     return fail(
         ErrorCode::invalid,
-        fmt::format("step {}: duty = {:.3g}, and the robot's motor has no reverse (its controller has duty_min "
-                    "= 0): take a profile whose duties are not below 0, such as identification_one_way, or send "
-                    "a controller with reverse first",
+        fmt::format("step {}: duty = {:.3g}, and the robot's controller has duty_min = 0, as for a motor without "
+                    "reverse, which refuses it: take a profile whose duties are not below 0, such as "
+                    "identification_one_way; if the motor has reverse, send a controller that uses it first",
                     demands.duty_step, demands.duty_min),
         "out_of_range");
+  }
+  if (static_cast<float>(demands.disturbance_max_m) > limits.disturbance_max_m) {
+    return fail(ErrorCode::invalid,
+                fmt::format("step {}: a disturbance of {:.6g} m is beyond the robot's setpoint_limit_m, {:.6g} m",
+                            demands.disturbance_step, demands.disturbance_max_m, limits.disturbance_max_m),
+                "out_of_range");
   }
   const bool is_too_low = static_cast<float>(demands.setpoint_min_m) < limits.setpoint_min_m;  // as the robot compares
   if (!is_too_low && static_cast<float>(demands.setpoint_max_m) <= limits.setpoint_max_m) return {};

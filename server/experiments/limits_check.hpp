@@ -25,15 +25,18 @@ struct Demands {
   std::size_t duty_step = 0;
   double setpoint_min_m = 0, setpoint_max_m = 0;
   std::size_t setpoint_min_step = 0, setpoint_max_step = 0;
+  double disturbance_max_m = 0;  // magnitude
+  std::size_t disturbance_step = 0;
   double longest_auto_s = 0;  // of a run, or of the way back to the next
 };
 Demands demands_of(const Profile& profile);
 
 // What a robot takes, as far as it is known.
 struct RobotLimits {
-  bool has_reverse = true;  // false where the controller in force has duty_min 0, as a motor without reverse has it
+  bool has_reverse = true;  // false where the controller in force has duty_min 0, as for a motor without reverse
   float setpoint_min_m = -std::numeric_limits<float>::infinity();
   float setpoint_max_m = std::numeric_limits<float>::infinity();
+  float disturbance_max_m = std::numeric_limits<float>::infinity();
   float auto_limit_s = std::numeric_limits<float>::infinity();
 };
 

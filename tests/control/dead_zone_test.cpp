@@ -67,7 +67,8 @@ TEST(DeadZone, IsNamedBetweenTheDutiesThatWereTried) {
     const auto doubt = std::ranges::find(found.doubts, DoubtCode::dead_zone, &Doubt::code);
     ASSERT_NE(doubt, found.doubts.end());
     EXPECT_DOUBLE_EQ(*doubt->value, 0.08);
-    EXPECT_FALSE(is_grave(*doubt));
+    EXPECT_TRUE(is_grave(*doubt)) << "for a robot that does not know of it";
+    EXPECT_EQ(doubt->widening, 1);
   }
 }
 

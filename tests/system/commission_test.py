@@ -97,6 +97,8 @@ class CommissionTest(unittest.TestCase):
             if record and "it ended before its end" not in (record["unsigned_because"] or "") and not has_stood_still(record):
                 return record, process.returncode, into
             self.reset(robot)
+            for name, value in (("dead_zone_duty", 0), ("doubtful_duty", 0.05)):
+                commanded(self.station, "set_parameter", robot, name=name, value=value)
             self.begun[robot] = begin(self.place, robot, self.answers[robot], attempt)
         raise AssertionError(said)
 
@@ -109,10 +111,10 @@ class CommissionTest(unittest.TestCase):
         self.assertLessEqual({verdicts[step] for step in busy}, {"pass", "attention"})
         gain = next(f["figures"]["gain_m_s"] for f in record["findings"] if f["step"] == "motor_constant")
         self.assertAlmostEqual(gain, 0.1, delta=0.015)  # of equation (29)
-        self.assertIn("dead_zone_duty was set to 0.080 and doubtful_duty to 0.100", found_in(record, "dead_zone"))
+        self.assertIn("doubtful_duty was set to 0.100 and dead_zone_duty to 0.060", found_in(record, "dead_zone"))
         parameters = self.station.get("/api/v1/robots/sound/parameters")["parameters"]
         values = {one["name"]: round(one["value"], 6) for one in parameters}
-        self.assertEqual((values["dead_zone_duty"], values["doubtful_duty"]), (0.08, 0.1))
+        self.assertEqual((values["dead_zone_duty"], values["doubtful_duty"]), (0.06, 0.1))
         self.assertEqual((status, record["signed_by"], record["not_marked"]), (0, "Ann", None))
         self.assertIn("--yes", record["confirmed_by"])
         self.assertIn("direction", record["answers_given_beforehand"])

@@ -80,7 +80,9 @@ http::Answer push_controller(PushRoutes parts, http::Request request) {
     co_return http::problem(422, fmt::format("design {}: {}", *id, controller.error().detail), "no_controller");
   }
   http::Request command = command_request(std::move(request), body->object(), std::move(*controller));
-  if (const auto checksum = checksum_in(command.body, parts.commands.station.settings(robot_id))) {
+  const bool is_known = parts.commands.station.find(robot_id) != nullptr;
+  const auto checksum = is_known ? checksum_in(command.body, parts.commands.station.settings(robot_id)) : std::nullopt;
+  if (checksum) {
     const auto noted = co_await parts.designs.note_sent(*id, robot_id, *checksum);
     if (!noted) co_return http::problem(noted.error());
   }

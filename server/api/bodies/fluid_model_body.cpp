@@ -74,6 +74,7 @@ Result<std::string> document_in(const Members& body, const analysis::ModelDoubts
     if (!plant.is_object()) return fail(ErrorCode::bad_request, "plant must be an object", "wrong_type");
     document["plant"] = plant;
   }
+  if (doubts.is_of_fit) document["doubts"] = nullptr;
   if (doubts.are_known) document["doubts"] = analysis::json_of(std::span{doubts.doubts});
   std::string text = base::dump(document);
   if (text.size() <= kMaxDocumentBytes) return text;

@@ -233,24 +233,29 @@ void Commissioning::judge_pushes() {
   add(set_dead_zone(*zone, found));
 }
 
-// A duty between the two that were tried may move the robot or not: `doubtful_duty` says so to its estimator.
+// SAFETY: the zone that is set ends where the propeller stood still for certain; what may move the robot is doubtful.
 StepFinding Commissioning::set_dead_zone(const DeadZoneToSet& zone, StepFinding found) {
+  const double doubtful = std::max(zone.moving, value_of(parameters_, "doubtful_duty", 0));
   const std::string answer = person_.text(
-      "set_dead_zone", fmt::format("The accelerometer saw nothing at a duty of {:.2f} and motion at {:.2f}. If the "
-                                   "propeller stood still there, type yes to set the robot's dead_zone_duty to {:.3f} "
-                                   "and doubtful_duty to {:.3f} (Enter: leave them)",
-                                   zone.still, zone.moving, zone.middle(), zone.moving));
+      "set_dead_zone",
+      fmt::format(
+          "The accelerometer saw nothing at a duty of {:.2f} and motion at {:.2f}. If the propeller stood still "
+          "at the first, type yes to set the robot's dead_zone_duty to {:.3f} and doubtful_duty to {:.3f} "
+          "(Enter: leave them)",
+          zone.still, zone.moving, zone.still, doubtful));
   if (answer != "yes") return found;
-  for (const auto& [name, value] : {std::pair{"dead_zone_duty", zone.middle()}, {"doubtful_duty", zone.moving}}) {
-    if (const std::string problem = robot_.set_parameter(name, value); !problem.empty()) {
-      found.found += fmt::format("; {} was not set: {}", name, problem);
-      return found;
-    }
+  if (const std::string problem = robot_.set_parameter("doubtful_duty", doubtful); !problem.empty()) {
+    found.found += "; neither parameter was set: " + problem;
+    return found;
   }
-  dead_zone_.parameter = zone.middle();
+  const std::string done = fmt::format("; doubtful_duty was set to {:.3f}", doubtful);
+  if (const std::string problem = robot_.set_parameter("dead_zone_duty", zone.still); !problem.empty()) {
+    found.found += done + ", and dead_zone_duty was not: " + problem;
+    return found;
+  }
+  dead_zone_.parameter = zone.still;
   StepFinding set = judge_dead_zone(dead_zone_);
-  set.found +=
-      fmt::format("; dead_zone_duty was set to {:.3f} and doubtful_duty to {:.3f}", zone.middle(), zone.moving);
+  set.found += done + fmt::format(" and dead_zone_duty to {:.3f}", zone.still);
   return set;
 }
 

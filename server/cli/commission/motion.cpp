@@ -236,8 +236,9 @@ StepFinding judge_imu_axis(const DirectionFacts& facts) {
 std::optional<DeadZoneToSet> dead_zone_to_set(const DeadZoneFacts& facts) {
   const Bracket forwards = bracket_of(facts.responses, 1), backwards = bracket_of(facts.responses, -1);
   if (!forwards.moving || (!facts.is_one_way && !backwards.moving)) return std::nullopt;
-  const DeadZoneToSet zone{std::max(forwards.still.value_or(0), facts.is_one_way ? 0 : backwards.still.value_or(0)),
-                           std::max(*forwards.moving, facts.is_one_way ? 0 : *backwards.moving)};
+  const double still = forwards.still.value_or(0);
+  const DeadZoneToSet zone{facts.is_one_way ? still : std::min(still, backwards.still.value_or(0)),
+                           facts.is_one_way ? *forwards.moving : std::max(*forwards.moving, *backwards.moving)};
   if (facts.parameter >= zone.still && facts.parameter <= zone.moving) return std::nullopt;
   return zone;
 }

@@ -67,8 +67,8 @@ struct DeadZoneFacts {
 };
 StepFinding judge_dead_zone(const DeadZoneFacts& facts);
 
-// The largest duty at which the propeller stood still, and the smallest that moved the robot; none: the parameter fits
-// them, or they are not known.
+// The largest duty at which the propeller stood still both ways, 0 if each moved the robot, and the smallest that moved
+// it both ways; none: the parameter fits them, or they are not known.
 struct DeadZoneToSet {
   double still = 0, moving = 0;
   double middle() const { return (still + moving) / 2; }

@@ -180,7 +180,9 @@ std::string Person::word(const std::string& name, const std::string& question,
 
 std::string Person::text(const std::string& name, const std::string& question) {
   if (answers_.contains(name)) return one_line(answers_.at(name).get<std::string>());
-  return has_terminal_ ? one_line(asked(question)) : std::string{};
+  if (!has_terminal_) return {};
+  forget_typed();
+  return one_line(asked(question));
 }
 
 }  // namespace server::cli

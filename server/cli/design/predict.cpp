@@ -14,6 +14,7 @@
 #include "server/analysis/tuning/robot_controller.hpp"
 #include "server/api/bodies/controller_body.hpp"
 #include "server/cli/design/robustness_table.hpp"
+#include "server/cli/terminal/exit_status.hpp"
 #include "server/cli/terminal/options.hpp"
 #include "server/storage/samples/position_sd.hpp"
 
@@ -93,7 +94,12 @@ Steering steering_of_run(const Predict& options, const protocol::Controller& of_
 }
 
 Steering steering_of(const Predict& options, const Measured& measured) {
-  if (measured.controller && !options.controller.file) return steering_of_run(options, *measured.controller);
+  if (measured.controller && !options.controller.file) {
+    if (options.sampling.method || options.sampling.a) {
+      throw UsageError{"--method and --a need --controller: the run's own controller is discrete already"};
+    }
+    return steering_of_run(options, *measured.controller);
+  }
   Steering steering;
   steering.controller = discretised(read(options.controller), options.sampling).chosen;
   steering.duty_min = options.duty_min.value_or(steering.duty_min);

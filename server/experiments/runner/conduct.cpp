@@ -156,23 +156,29 @@ asio::awaitable<Result<storage::Run>> Conduct::create_run(const Variant& variant
   co_return co_await parts_.runs.create(experiment_.request.robot_id, std::move(conditions), std::move(by));
 }
 
+// A second; from ends_us on the experiment pauses. Returns the next ends_us.
+asio::awaitable<std::int64_t> Conduct::await_disk(std::int64_t ends_us, std::string problem) {
+  activity_ = "waiting for the disk, to begin its run";
+  co_await parts_.driver.clock.sleep_for(kDiskAgain);
+  if (parts_.driver.clock.steady_us() > ends_us) {  // SAFETY: nobody knows when it is back, and who is there then
+    is_resumed_ = false;
+    waiting_for_ = Abort{"not_recorded", std::move(problem)};
+    co_await await_resumption(kFluidWithin);
+    ends_us = parts_.driver.clock.steady_us() + parts_.driver.back_within.count();
+  }
+  co_await await_link();
+  co_await await_actor();
+  activity_.clear();
+  co_return ends_us;
+}
+
 asio::awaitable<void> Conduct::begin_recording(const Variant& variant, const TimeLine& line) {
   auto run = co_await create_run(variant);
   std::int64_t ends_us = parts_.driver.clock.steady_us() + parts_.driver.back_within.count();
   while (!run && may_pass(run.error()) && !abort_) {
-    activity_ = "waiting for the disk, to begin its run";
-    co_await parts_.driver.clock.sleep_for(kDiskAgain);
-    if (parts_.driver.clock.steady_us() > ends_us) {  // SAFETY: nobody knows when it is back, and who is there then
-      is_resumed_ = false;
-      waiting_for_ = Abort{"not_recorded", run.error().detail};
-      co_await await_resumption(kFluidWithin);
-      ends_us = parts_.driver.clock.steady_us() + parts_.driver.back_within.count();
-    }
-    co_await await_link();
-    co_await await_actor();
+    ends_us = co_await await_disk(ends_us, run.error().detail);
     if (!abort_) run = co_await create_run(variant);
   }
-  activity_.clear();
   if (!run) {
     abort({"run_refused", run.error().detail});
     co_return;

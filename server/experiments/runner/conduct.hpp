@@ -108,6 +108,7 @@ class Conduct {
   boost::asio::awaitable<DriveEnd> drive(const Profile& profile, TimeLine line);
   boost::asio::awaitable<Result<void>> check_travel(Profile profile, TimeLine rest, double position_m);
   boost::asio::awaitable<void> await_link();
+  boost::asio::awaitable<std::int64_t> await_disk(std::int64_t ends_us, std::string problem);
   boost::asio::awaitable<void> end_recording();
   // The robot time at which it acts; aborts if it is refused. One that comes too late to the resting robot is sent
   // again.

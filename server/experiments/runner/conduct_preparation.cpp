@@ -15,7 +15,8 @@ using nlohmann::json;
 
 namespace {
 
-constexpr microseconds kLook = 200ms, kModelWithin = 30s, kSamplesWithin = 3s, kCommandWithin = 10s;
+constexpr microseconds kLook = 200ms, kModelWithin = 30s, kSamplesWithin = 3s, kCommandWithin = 10s,
+                       kSettingsWithin = 2s;
 
 }  // namespace
 
@@ -40,13 +41,23 @@ RobotLimits limits_of(const station::RobotSettings* settings) {
   const float largest_m = value("setpoint_limit_m", limits.setpoint_max_m);
   limits.setpoint_min_m = std::max(-largest_m, value("position_limit_min_m", -largest_m));
   limits.setpoint_max_m = std::min(largest_m, value("position_limit_max_m", largest_m));
+  limits.disturbance_max_m = largest_m;
   limits.auto_limit_s = value("auto_limit_s", limits.auto_limit_s);
   return limits;
 }
 
 // Of a robot that was away when the experiment was asked for, or was told other limits since: what it would refuse in
-// the middle of a run ends the experiment before anything begins.
+// the middle of a run ends the experiment before that run begins. After a new connection it says them within a second;
+// one that has neither controller nor parameters never does.
 asio::awaitable<void> Conduct::check_limits_of_robot() {
+  const std::int64_t ends_us = parts_.driver.clock.steady_us() + (number_ == 1 ? kSettingsWithin.count() : 0);
+  const auto is_known = [this] {
+    const auto* settings = parts_.driver.station.settings(experiment_.request.robot_id);
+    return settings != nullptr && settings->is_controller_current && settings->parameters.is_current();
+  };
+  while (!abort_ && !is_known() && parts_.driver.clock.steady_us() < ends_us) {
+    co_await changed_.wait_until(parts_.driver.clock, parts_.driver.clock.steady_us() + kLook.count());
+  }
   auto find = [profile = profile_] { return demands_of(profile); };
   const Demands demands = co_await parts_.maths.run(std::move(find));
   const auto allowed = check_demands(demands, limits_of(parts_.driver.station.settings(experiment_.request.robot_id)));
@@ -55,7 +66,7 @@ asio::awaitable<void> Conduct::check_limits_of_robot() {
 
 asio::awaitable<void> Conduct::prepare(Variant variant) {
   co_await await_link();
-  if (!abort_ && number_ == 1) co_await check_limits_of_robot();
+  if (!abort_) co_await check_limits_of_robot();
   co_await await_actor();
   if (!abort_) take_control();
   if (!abort_) co_await await_fluid(variant.fluid);
@@ -217,12 +228,12 @@ asio::awaitable<std::uint64_t> Conduct::submit(const char* what, protocol::Comma
 }
 
 asio::awaitable<void> Conduct::send_controller(std::string name) {
-  const std::int64_t ends_us = parts_.driver.clock.steady_us() + kCommandWithin.count();
+  std::int64_t ends_us = parts_.driver.clock.steady_us() + parts_.driver.back_within.count();
   auto controller = co_await parts_.controller_by_name(name, experiment_.request.robot_id);
-  while (!abort_ && !controller && controller.error().code == ErrorCode::unavailable &&
-         parts_.driver.clock.steady_us() < ends_us) {  // the disk, on which it is noted first
-    co_await parts_.driver.clock.sleep_for(kLook);
-    controller = co_await parts_.controller_by_name(name, experiment_.request.robot_id);
+  while (!abort_ && !controller &&
+         controller.error().code == ErrorCode::unavailable) {  // that it is sent is noted first
+    ends_us = co_await await_disk(ends_us, controller.error().detail);
+    if (!abort_) controller = co_await parts_.controller_by_name(name, experiment_.request.robot_id);
   }
   if (abort_) co_return;  // SAFETY: what was decided meanwhile holds: nothing is sent any more
   if (!controller) {

@@ -90,7 +90,8 @@ asio::awaitable<Result<ExperimentView>> Experiments::begin(storage::ExperimentRe
   if (request.is_unattended && !prepared->profile.is_unattended) {
     co_return fail(ErrorCode::invalid, "the profile does not say unattended = true", "unattended_not_allowed");
   }
-  const RobotLimits limits = limits_of(parts_.station.settings(request.robot_id));
+  const bool is_there = parts_.station.find(request.robot_id)->link == station::LinkState::connected;
+  const RobotLimits limits = limits_of(is_there ? parts_.station.settings(request.robot_id) : nullptr);
   if (auto taken = check_demands(prepared->demands, limits); !taken) co_return std::unexpected{taken.error()};
   Entry entry;
   entry.profile = std::move(prepared->profile);

@@ -112,7 +112,7 @@ std::vector<RunId> read_runs_made_with(SQLite::Database& database, DesignId id) 
   SQLite::Statement rows{database,
                          "SELECT DISTINCT run_id FROM run JOIN design_sent USING (robot_id, controller_checksum)"
                          " WHERE (design_id = ?1 OR design_id IN (SELECT design_id FROM design WHERE model_id = ?1))"
-                         " AND state <> 'discarded' ORDER BY run_id DESC LIMIT ?2"};
+                         " AND started_at_us >= first_at_us AND state <> 'discarded' ORDER BY run_id DESC LIMIT ?2"};
   bind_all(rows, id, static_cast<std::int64_t>(kMostRunsMadeWith));
   std::vector<RunId> runs;
   while (rows.executeStep()) runs.push_back(rows.getColumn(0).getInt64());
@@ -198,7 +198,7 @@ asio::awaitable<std::vector<ControllerOfRun>> Designs::controllers_of(RunId run)
     const SQLite::Transaction moment{database};
     SQLite::Statement rows{database,
                            "SELECT design_id FROM design_sent JOIN run USING (robot_id, controller_checksum)"
-                           " WHERE run_id = ? ORDER BY design_id DESC LIMIT ?"};
+                           " WHERE run_id = ? AND started_at_us >= first_at_us ORDER BY design_id DESC LIMIT ?"};
     bind_all(rows, run, static_cast<std::int64_t>(kMostControllersOfRun));
     std::vector<ControllerOfRun> found;
     while (rows.executeStep()) {

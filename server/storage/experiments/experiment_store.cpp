@@ -4,6 +4,7 @@
 #include <SQLiteCpp/SQLiteCpp.h>
 #include <fmt/format.h>
 
+#include "server/runtime/sha256.hpp"
 #include "server/storage/audit/audit_chain.hpp"
 #include "server/storage/database/statement.hpp"
 
@@ -132,9 +133,13 @@ void add_experiment_run(Database& database, ExperimentId id, const ExperimentRun
                         " started_at_us, prediction) VALUES (?, ?, ?, ?, ?, ?, ?, nullif(?, ''))"};
   execute(add, id, run.number, text(run.state), run.run, run.variant, run.steps, run.started_at_us, prediction);
   SQLite::Statement origin{handle,
-                           "INSERT INTO run_origin (run_id, experiment_id, number, variant, profile)"
-                           " SELECT ?, experiment_id, ?, ?, profile FROM experiment WHERE experiment_id = ?"};
-  if (run.run) execute(origin, *run.run, run.number, run.variant, id);
+                           "INSERT INTO run_origin (run_id, experiment_id, number, variant, profile_sha256, profile)"
+                           " SELECT ?, experiment_id, ?, ?, ?, profile FROM experiment WHERE experiment_id = ?"};
+  SQLite::Statement profile{handle, "SELECT profile FROM experiment WHERE experiment_id = ?"};
+  bind_all(profile, id);
+  if (run.run && profile.executeStep()) {
+    execute(origin, *run.run, run.number, run.variant, runtime::sha256_of(profile.getColumn(0).getString()), id);
+  }
   transaction.commit();
 }
 

@@ -84,18 +84,17 @@ class Interruptions {
   BootTimes times_{database_};
 };
 
-constexpr const char* kOfOrigin = "SELECT experiment_id, number, variant, profile FROM run_origin WHERE run_id = ?";
+// Without the profile, which may be long, where its hash is stored.
+constexpr const char* kOrigin =
+    "SELECT experiment_id, number, profile_sha256, iif(profile_sha256 IS NULL, profile, '') FROM run_origin"
+    " WHERE run_id = ?";
 
-std::optional<PerformedProfile> performed_profile(SQLite::Statement& of_origin, RunId id) {
-  bind_all(of_origin, id);
-  if (!of_origin.executeStep()) return std::nullopt;
-  PerformedProfile performed;
-  performed.origin.experiment = of_origin.getColumn(0).getInt64();
-  performed.origin.number = of_origin.getColumn(1).getUInt();
-  performed.variant = of_origin.getColumn(2).getString();
-  performed.document = of_origin.getColumn(3).getString();
-  performed.origin.profile_sha256 = runtime::sha256_of(performed.document);
-  return performed;
+std::optional<RunOrigin> origin_of(SQLite::Statement& origin, RunId id) {
+  bind_all(origin, id);
+  if (!origin.executeStep()) return std::nullopt;
+  const SQLite::Column sha256 = origin.getColumn(2);
+  return RunOrigin{origin.getColumn(0).getInt64(), origin.getColumn(1).getUInt(),
+                   sha256.isNull() ? runtime::sha256_of(origin.getColumn(3).getString()) : sha256.getString()};
 }
 
 // Fills in spans, counts and origin, run by run.
@@ -105,7 +104,7 @@ class RunReading {
 
   void complete(Run& run) {
     const bool has_digest = read_digest(run);
-    if (auto performed = performed_profile(origin_, run.id)) run.origin = std::move(performed->origin);
+    run.origin = origin_of(origin_, run.id);
     bind_all(spans_, run.id);
     while (spans_.executeStep()) {
       const std::int64_t boot_key = spans_.getColumn(0).getInt64();
@@ -166,7 +165,7 @@ class RunReading {
   SQLite::Statement lost_{database_,
                           "SELECT coalesce(sum(min(last_seq, ?3) - max(first_seq, ?2) + 1), 0) FROM gap"
                           " WHERE boot_key = ?1 AND first_seq <= ?3 AND last_seq >= ?2"};
-  SQLite::Statement origin_{database_, kOfOrigin};
+  SQLite::Statement origin_{database_, kOrigin};
   Interruptions interruptions_{database_};
 };
 
@@ -199,8 +198,14 @@ std::optional<Run> find_run(SQLite::Database& database, const BootHeads& heads, 
 }
 
 std::optional<PerformedProfile> read_performed_profile(SQLite::Database& database, RunId id) {
-  SQLite::Statement of_origin{database, kOfOrigin};
-  return performed_profile(of_origin, id);
+  const SQLite::Transaction moment{database};
+  SQLite::Statement row{database, kOrigin};
+  auto origin = origin_of(row, id);
+  if (!origin) return std::nullopt;
+  SQLite::Statement performed{database, "SELECT variant, profile FROM run_origin WHERE run_id = ?"};
+  bind_all(performed, id);
+  performed.executeStep();
+  return PerformedProfile{std::move(*origin), performed.getColumn(0).getString(), performed.getColumn(1).getString()};
 }
 
 std::vector<InterruptedPart> read_interrupted_parts(SQLite::Database& database, RunId id) {

@@ -111,7 +111,7 @@ TEST_F(ExperimentRoutesTest, WhatTheRobotWouldRefuseEndsItBeforeAnythingBegins) 
   EXPECT_EQ(refused.status, 422);
   EXPECT_EQ(refused.parsed()["reason"], "out_of_range");
   EXPECT_THAT(refused.parsed()["detail"].get<std::string>(),
-              HasSubstr("step 1: duty = -0.2, and the robot's motor has no reverse"));
+              HasSubstr("step 1: duty = -0.2, and the robot's controller has duty_min = 0"));
   EXPECT_EQ(begin_one(profile({{"kind", "duty"}, {"duty", 0.2}, {"for_s", 1}})).status, 202);
 }
 

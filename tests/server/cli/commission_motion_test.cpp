@@ -123,7 +123,7 @@ TEST(CommissionMotion, FindsTheDeadZoneBetweenTwoDuties) {
   EXPECT_EQ(dead_zone_of(0.08, 0.08).verdict, Verdict::pass) << "one that the robot knows";
   const auto to_set = dead_zone_to_set(dead_zone_facts(0.08, 0));
   ASSERT_TRUE(to_set);
-  EXPECT_NEAR(to_set->middle(), 0.08, 1e-12);
+  EXPECT_EQ(to_set->still, 0.06);
   EXPECT_EQ(to_set->moving, 0.1);
   EXPECT_FALSE(dead_zone_to_set(dead_zone_facts(0.08, 0.08)));
   EXPECT_FALSE(dead_zone_to_set(dead_zone_facts(0.9, 0))) << "where nothing moves";

@@ -7,10 +7,11 @@ CREATE TABLE run_origin (               -- runs of experiments; stays when the e
   experiment_id INTEGER NOT NULL,
   number INTEGER NOT NULL,              -- of the run in its experiment, from 1
   variant TEXT NOT NULL,                -- JSON: fluid, controller, factors, repeat, step
+  profile_sha256 TEXT,                  -- of profile; NULL: it has not been computed
   profile TEXT NOT NULL                 -- the document that was performed, TOML or JSON
 );
 INSERT OR IGNORE INTO run_origin
-  SELECT run_id, experiment_id, number, variant, profile FROM experiment_run JOIN experiment USING (experiment_id)
+  SELECT run_id, experiment_id, number, variant, NULL, profile FROM experiment_run JOIN experiment USING (experiment_id)
   WHERE run_id IN (SELECT run_id FROM run);
 
 CREATE TABLE design_sent (              -- controllers of designs that a robot was to be sent; a run has its checksum
@@ -21,3 +22,4 @@ CREATE TABLE design_sent (              -- controllers of designs that a robot w
   PRIMARY KEY (design_id, robot_id, controller_checksum)
 ) WITHOUT ROWID;
 CREATE INDEX design_sent_by_robot ON design_sent(robot_id, controller_checksum);
+CREATE INDEX design_by_model ON design(model_id);

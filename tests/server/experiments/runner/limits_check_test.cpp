@@ -54,7 +54,8 @@ TEST(RobotLimits, OfADutyAreThoseOfItsMotor) {
       "[[step]]\nkind = \"rest\"\nfor_s = 1\n[[step]]\nkind = \"prbs\"\namplitude = 0.3\nmean_duty = 0.2\nbit_s = "
       "0.2\nfor_s = 5\n";
   EXPECT_EQ(problem_of(prbs, {}), "");
-  EXPECT_THAT(problem_of(prbs, {.has_reverse = false}), HasSubstr("step 2: duty = -0.1, and the robot's motor has no"));
+  EXPECT_THAT(problem_of(prbs, {.has_reverse = false}),
+              HasSubstr("step 2: duty = -0.1, and the robot's controller has"));
   const char* const setpoints =
       "[[step]]\nkind = \"setpoint\"\nsetpoint_m = 0.7\nfor_s = 3\n[[step]]\nkind = \"setpoint\"\nsetpoint_m = -0.2\n"
       "for_s = 3\n";
@@ -63,6 +64,12 @@ TEST(RobotLimits, OfADutyAreThoseOfItsMotor) {
               HasSubstr("step 1: setpoint_m = 0.7 is outside -inf to 0.5 m, the limits of the robot"));
   EXPECT_THAT(problem_of(setpoints, {.setpoint_min_m = -0.1F}), HasSubstr("step 2: setpoint_m = -0.2 is outside -0.1"));
   EXPECT_EQ(problem_of(setpoints, {.has_reverse = false}), "") << "a closed loop is clamped";
+  const std::string disturbed =
+      std::string{setpoints} + "[[step]]\nkind = \"disturbance\"\ndisturbance_m = -0.2\nfor_s = 2\n";
+  EXPECT_EQ(problem_of(disturbed.c_str(), {.disturbance_max_m = 0.2F}), "");
+  EXPECT_THAT(problem_of(disturbed.c_str(), {.disturbance_max_m = 0.1F}), HasSubstr("step 3: a disturbance of 0.2 m"));
+  const std::string twice = "[conditions]\nstart = \"back\"\n[sweep]\nrepeats = 2\n" + std::string{prbs};
+  EXPECT_THAT(problem_of(twice.c_str(), {.auto_limit_s = 10}), HasSubstr("stays in auto for 15.0 s"));
 }
 
 TEST(LongestAuto, IsTheLongestStretchOfAllRuns) {

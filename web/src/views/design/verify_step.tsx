@@ -49,7 +49,6 @@ export function VerifyStep({ session, work, design, runs, tune }: StepProps) {
     [design.verified],
   );
   const found = metrics.answer?.id === design.verified ? (metrics.answer?.found ?? null) : null;
-  const run = own.find(({ run_id }) => run_id === design.verified);
   const tuned = work.tuning.answer_to(tune?.key)?.result ?? null;
   const controller = useAsked(
     session,
@@ -57,7 +56,15 @@ export function VerifyStep({ session, work, design, runs, tune }: StepProps) {
     [design.controller, design.verified],
   );
   const is_asked = controller.answer?.design_id === design.controller && design.controller !== null;
-  const note = run && is_asked ? controller_note(run.run_id, controller.answer!.runs_made_with) : '';
+  const made_with = is_asked ? controller.answer!.runs_made_with : null;
+  const note =
+    design.verified === null
+      ? ''
+      : design.controller === null
+        ? 'Whether the run was made with this controller is not known: it is not kept.'
+        : made_with !== null
+          ? controller_note(design.verified, made_with)
+          : '';
   return (
     <Step
       work={work}
