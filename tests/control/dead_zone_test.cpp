@@ -21,7 +21,7 @@ using testing::Le;
 using testing::Not;
 using testing::StartsWith;
 
-constexpr double kTickS = 0.01;
+constexpr double kPushTickS = 0.01;
 constexpr FractionalModel kFluidOfMotor{0.1, 0.0045, 0.15, 1, 1.75, 0.85};
 const auto kStandsStill = StartsWith("the motor stands still below a duty between ");
 
@@ -42,13 +42,13 @@ std::vector<double> made_by_motor(std::vector<double> duty, double dead_zone) {
 }
 
 Recording accelerations(const std::vector<double>& duty, double dead_zone, unsigned seed) {
-  Recording run{kTickS, duty, {}, {}};
-  run.acceleration_m_s2 = output_of(kFluidOfMotor, Channel::acceleration, kTickS, made_by_motor(duty, dead_zone));
+  Recording run{kPushTickS, duty, {}, {}};
+  run.acceleration_m_s2 = output_of(kFluidOfMotor, Channel::acceleration, kPushTickS, made_by_motor(duty, dead_zone));
   add_noise(run.acceleration_m_s2, 0.012, seed);
   return run;
 }
 
-IdentificationOptions fractional_only() {
+IdentificationOptions one_start_only() {
   IdentificationOptions options = unhurried_options();
   options.structure = Structure::fractional;
   options.further_starts = 0;
@@ -59,7 +59,7 @@ const std::vector<double> kPushed{0.03, 0.06, 0.1, 0.15, 0.2, 0.3};
 
 TEST(DeadZone, IsNamedBetweenTheDutiesThatWereTried) {
   for (const unsigned seed : {1U, 2U, 3U}) {
-    const Identification found = identify(accelerations(pushes(kPushed), 0.08, seed), fractional_only());
+    const Identification found = identify(accelerations(pushes(kPushed), 0.08, seed), one_start_only());
     ASSERT_TRUE(found.dead_zone) << seed;
     EXPECT_EQ(found.dead_zone->from_duty, 0.06);
     EXPECT_EQ(found.dead_zone->to_duty, 0.1);
@@ -75,10 +75,10 @@ TEST(DeadZone, IsNamedBetweenTheDutiesThatWereTried) {
 // The parameters are those of the fluid, as the same record of a motor without a dead zone gives them.
 TEST(DeadZone, TheFluidComesOutAsWithoutIt) {
   const auto found_behind = [](double dead_zone) {
-    Recording run{kTickS, pushes(kPushed), {}, {}};
-    run.position_m = output_of(kFluidOfMotor, Channel::position, kTickS, made_by_motor(run.duty, dead_zone));
+    Recording run{kPushTickS, pushes(kPushed), {}, {}};
+    run.position_m = output_of(kFluidOfMotor, Channel::position, kPushTickS, made_by_motor(run.duty, dead_zone));
     add_noise(run.position_m, 2e-4, 3);
-    return identify(run, fractional_only());
+    return identify(run, one_start_only());
   };
   const Identification found = found_behind(0.08), without = found_behind(0);
   ASSERT_TRUE(found.dead_zone);
@@ -93,14 +93,14 @@ TEST(DeadZone, TheFluidComesOutAsWithoutIt) {
 TEST(DeadZone, OfAChirpIsNamedOnAGrid) {
   std::vector<double> duty;
   for (int k = 0; k < 4000; ++k) duty.push_back(0.2 * std::sin(1e-5 * k * k + 0.01 * k));
-  const Identification found = identify(accelerations(duty, 0.08, 3), fractional_only());
+  const Identification found = identify(accelerations(duty, 0.08, 3), one_start_only());
   ASSERT_TRUE(found.dead_zone);
   EXPECT_THAT(found.dead_zone->from_duty, AllOf(Gt(0.06), Le(0.1)));
 }
 
 TEST(DeadZone, IsNotSeenInAMotorWithoutOne) {
   for (const unsigned seed : {1U, 2U, 3U, 4U, 5U}) {
-    const Identification found = identify(accelerations(pushes(kPushed), 0, seed), fractional_only());
+    const Identification found = identify(accelerations(pushes(kPushed), 0, seed), one_start_only());
     EXPECT_FALSE(found.dead_zone) << seed;
     EXPECT_THAT(found.warnings, Not(Contains(kStandsStill)));
   }
@@ -108,20 +108,20 @@ TEST(DeadZone, IsNotSeenInAMotorWithoutOne) {
 
 // A duty of one magnitude does not show it, and needs not: the robot was never driven below.
 TEST(DeadZone, IsNotAskedForWhereEachDutyMovesTheRobot) {
-  const Identification found = identify(accelerations(prbs_duty(0.6, 0.4, 20, kTickS), 0.08, 1), fractional_only());
+  const Identification found = identify(accelerations(prbs_duty(0.6, 0.4, 20, kPushTickS), 0.08, 1), one_start_only());
   EXPECT_FALSE(found.dead_zone);
 }
 
 // A drag that grows with the speed is no dead zone.
 TEST(DeadZone, IsNoDragThatFollowsTheSpeed) {
-  Recording run{kTickS, pushes(kPushed), {}, {}};
-  std::vector<double> drag = output_of(kFluidOfMotor, Channel::velocity, kTickS, run.duty);
+  Recording run{kPushTickS, pushes(kPushed), {}, {}};
+  std::vector<double> drag = output_of(kFluidOfMotor, Channel::velocity, kPushTickS, run.duty);
   for (double& velocity : drag) velocity *= 30 * std::abs(velocity);
-  run.velocity_m_s = output_of(kFluidOfMotor, Channel::velocity, kTickS, run.duty);
-  const std::vector<double> slower = output_of(kFluidOfMotor, Channel::velocity, kTickS, drag);
+  run.velocity_m_s = output_of(kFluidOfMotor, Channel::velocity, kPushTickS, run.duty);
+  const std::vector<double> slower = output_of(kFluidOfMotor, Channel::velocity, kPushTickS, drag);
   for (std::size_t k = 0; k < slower.size(); ++k) run.velocity_m_s[k] -= slower[k];
   add_noise(run.velocity_m_s, 1e-5, 3);
-  EXPECT_FALSE(identify(run, fractional_only()).dead_zone);
+  EXPECT_FALSE(identify(run, one_start_only()).dead_zone);
 }
 
 }  // namespace

@@ -2,6 +2,7 @@
 #include <fstream>
 #include <sstream>
 
+#include "server/runtime/sha256.hpp"
 #include "server/storage/database/schema.hpp"
 #include "server/storage/query/run_reader.hpp"
 #include "server/storage/upkeep/audit_check.hpp"
@@ -184,6 +185,28 @@ TEST_F(MigrationTest, EveryOldSchemaVerifiesAfterItsUpdate) {
     stop();
     EXPECT_EQ(faults(), std::vector<std::string>{}) << "version " << version << ", after a station";
   }
+}
+
+// Of experiments that are still kept; one whose run was never made has none.
+TEST_F(MigrationTest, RunsOfExperimentsGetTheirOrigin) {
+  make_version(11);
+  {
+    SQLite::Database database{path_.string(), SQLite::OPEN_READWRITE};
+    database.exec(
+        "INSERT INTO experiment (experiment_id, robot_id, name, profile, notes, priority, unattended, state, owner,"
+        " acts_for, place, runs_planned, duration_s, created_at_us) VALUES (7, 'nemo', 'rest', 'the profile', '', 0, 0,"
+        " 'done', 'token:local', 'token:local', 1, 2, 5, 1)");
+    database.exec(
+        "INSERT INTO experiment_run (experiment_id, number, state, run_id, variant, steps, started_at_us) VALUES"
+        " (7, 1, 'done', 2, '{}', '[]', 1), (7, 2, 'aborted', NULL, '{}', '[]', 2)");
+  }
+  start();
+  EXPECT_EQ(rows("SELECT run_id, experiment_id, number, variant, profile_sha256, profile FROM run_origin"),
+            (std::vector<std::string>{"2|7|1|{}||the profile"}));
+  const auto run = wait(runs_->find(2));
+  ASSERT_TRUE(run && run->origin);
+  EXPECT_EQ(run->origin->experiment, 7);
+  EXPECT_EQ(run->origin->profile_sha256, runtime::sha256_of("the profile"));
 }
 
 TEST_F(MigrationTest, ToolsReadVersion1WithoutChangingIt) {
