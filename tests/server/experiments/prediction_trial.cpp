@@ -15,6 +15,7 @@
 #include "control/tuning/tune.hpp"
 #include "robot_fw/core/controller_message.hpp"
 #include "server/analysis/control_json.hpp"
+#include "server/analysis/tuning/robot_controller.hpp"
 #include "server/experiments/profile_document.hpp"
 #include "server/station/state/fluid_model.hpp"
 #include "sim_robot/lab/station_peer.hpp"
@@ -190,7 +191,7 @@ TrialRun run_of(const PredictionTrial& trial) {
 void BandTally::add(const TrialRun& run) {
   const PredictionRequest& request = run.request;
   const DutyRange duty{request.controller.duty_min, request.controller.duty_max};
-  const auto sections = sections_of(request.controller);
+  const auto sections = analysis::sections_of(request.controller);
   const Preview preview = preview_of(request.profile, request.line, request.model, sections, duty.min, duty.max);
   const PositionBand band = band_of({request.profile, request.line, request.model, request.uncertainty.value(),
                                      sections, duty, request.estimate.value()});
