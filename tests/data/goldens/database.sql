@@ -1,5 +1,5 @@
 PRAGMA application_id = 1382573423;
-PRAGMA user_version = 13;
+PRAGMA user_version = 14;
 BEGIN;
 CREATE TABLE api_token (
   name TEXT PRIMARY KEY,
@@ -1051,6 +1051,21 @@ CREATE TABLE rest_owed (              -- robots that move in a name whose right 
   why TEXT NOT NULL,                  -- what has ended the right
   since_us INTEGER NOT NULL
 ) WITHOUT ROWID;
+CREATE TABLE run_origin (               -- runs of experiments; stays when the experiment is forgotten
+  run_id INTEGER PRIMARY KEY REFERENCES run,
+  experiment_id INTEGER NOT NULL,
+  number INTEGER NOT NULL,              -- of the run in its experiment, from 1
+  variant TEXT NOT NULL,                -- JSON: fluid, controller, factors, repeat, step
+  profile_sha256 TEXT,                  -- of profile; NULL: it has not been computed
+  profile TEXT NOT NULL                 -- the document that was performed, TOML or JSON
+);
+CREATE TABLE design_sent (              -- controllers of designs that a robot was to be sent; a run has its checksum
+  design_id INTEGER NOT NULL REFERENCES design,
+  robot_id TEXT NOT NULL,
+  controller_checksum INTEGER NOT NULL,
+  first_at_us INTEGER NOT NULL,         -- when it was to be sent for the first time
+  PRIMARY KEY (design_id, robot_id, controller_checksum)
+) WITHOUT ROWID;
 DELETE FROM sqlite_sequence;
 INSERT INTO sqlite_sequence VALUES('run',7);
 CREATE INDEX boot_by_robot ON boot(robot_id);
@@ -1199,4 +1214,6 @@ CREATE INDEX run_span_by_boot ON run_span(boot_key);
 CREATE INDEX run_by_robot ON run(robot_id, started_at_us);
 CREATE INDEX command_stop ON command(boot_id, effect_at_robot_us) WHERE kind = 'emergency_stop';
 CREATE INDEX event_of_interruption ON event(boot_key, robot_time_us) WHERE kind = 'experiment_interrupted';
+CREATE INDEX design_sent_by_robot ON design_sent(robot_id, controller_checksum);
+CREATE INDEX design_by_model ON design(model_id);
 COMMIT;
