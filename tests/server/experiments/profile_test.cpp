@@ -193,7 +193,7 @@ TEST(Profile, TheDocumentOfThreeTonesIsSoundAtEveryCrossover) {
 }
 
 TEST(Profile, ThoseOfTheProgramAreSound) {
-  ASSERT_EQ(shipped_profiles().size(), 9U);
+  ASSERT_EQ(shipped_profiles().size(), 11U);
   for (const base::EmbeddedFile& shipped : shipped_profiles()) {
     const Profile profile = find_profile(std::string(shipped.name));
     EXPECT_FALSE(variants_of(profile).empty()) << shipped.name;
