@@ -50,7 +50,10 @@ RobotLimits limits_of(const station::RobotSettings* settings) {
 // the middle of a run ends the experiment before that run begins. After a new connection it says them within a second;
 // one that has neither controller nor parameters never does.
 asio::awaitable<void> Conduct::check_limits_of_robot() {
-  const std::int64_t ends_us = parts_.driver.clock.steady_us() + (number_ == 1 ? kSettingsWithin.count() : 0);
+  const std::int64_t connected_for_us = parts_.driver.clock.utc_us() - robot().connected_at_us;
+  const std::int64_t left_us =
+      std::clamp<std::int64_t>(kSettingsWithin.count() - connected_for_us, 0, kSettingsWithin.count());
+  const std::int64_t ends_us = parts_.driver.clock.steady_us() + left_us;
   const auto is_known = [this] {
     const auto* settings = parts_.driver.station.settings(experiment_.request.robot_id);
     return settings != nullptr && settings->is_controller_current && settings->parameters.is_current();

@@ -116,6 +116,7 @@ TEST_F(ExperimentRoutesTest, WhatTheRobotWouldRefuseEndsItBeforeAnythingBegins) 
 }
 
 TEST_F(ExperimentRoutesTest, IsQueuedRecordedAndShown) {
+  clock.run_for(2s);  // this robot says nothing of its limits
   pass(1);
   const Answered begun = begin_one(rest(1), {{"notes", "quiet"}, {"priority", 5}});
   ASSERT_EQ(begun.status, 202) << begun.body;

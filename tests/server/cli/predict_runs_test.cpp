@@ -69,9 +69,9 @@ TEST_F(RunTools, PredictTakesTheControllerThatTheRunHad) {
   controller.duty_min = 0;
   controller.duty_max = 0.625F;
   controller.checksum = robot_.controller_checksum = api::checksum_of(controller);
+  begin();
   recorder_->on_in_force(station::RobotState{},
                          {.boot_id = robot_.boot_id, .is_change = false, .first_seq = 0, .content = controller});
-  begin();
   robot_.context.mode = rheonaut_MODE_AUTO;
   robot_.context.setpoint_m = 0.2F;
   swim(300, 0.3);
