@@ -84,8 +84,8 @@ std::string in_words(const Doubt& doubt) {
                                rounded(1e3 * value, 2) + " ms"
                          : "the dead time is not determined: it lies at the limit of the search";
     case DoubtCode::dead_zone:
-      return "the motor stands still below a duty of about " + rounded(value, 2) +
-             ", which the model does not hold: set the robot's dead_zone_duty";
+      return "the motor stands still up to a duty of " + rounded(value, 2) +
+             ", which the model does not hold: set the robot's dead_zone_duty to it";
     case DoubtCode::part_of_run_used: return "the fit used " + rounded(100 * value, 4) + " % of the run";
   }
   return "a doubt that this version does not know";

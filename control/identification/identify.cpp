@@ -114,7 +114,7 @@ Identification identify(const Recording& recording, const IdentificationOptions&
   if (beyond.best.end == SearchEnd::time_limit) return beyond;
   if (!is_better_beyond(beyond, found)) return found;
   beyond.dead_zone = zone;
-  beyond.doubts.push_back({DoubtCode::dead_zone, (zone.from_duty + zone.to_duty) / 2});
+  beyond.doubts.push_back({DoubtCode::dead_zone, zone.from_duty});
   beyond.warnings.push_back(dead_zone_in_words(zone));
   return beyond;
 }

@@ -189,6 +189,7 @@ std::optional<Explained> explained_by(const Residuals& residuals, const MatrixXd
 // Between the magnitudes of the duty, where they are few; else a grid up to half of the largest.
 std::vector<DeadZone> possible_dead_zones(const std::vector<double>& duty) {
   std::vector<double> levels;
+  levels.reserve(duty.size());
   for (const double value : duty) levels.push_back(std::abs(value));
   std::ranges::sort(levels);
   const auto is_same = [](double a, double b) { return b - a < kSameDuty; };
@@ -291,7 +292,8 @@ std::string dead_zone_in_words(const DeadZone& zone) {
   std::ostringstream text;
   text.precision(3);
   text << "the motor stands still below a duty between " << zone.from_duty << " and " << zone.to_duty
-       << ": the fit takes the duties below for 0; set the robot's dead_zone_duty, which the model does not hold";
+       << ": the fit takes the duties below for 0, which the model does not hold; set the robot's dead_zone_duty to "
+       << zone.from_duty << " and doubtful_duty to " << zone.to_duty;
   return text.str();
 }
 

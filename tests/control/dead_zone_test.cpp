@@ -63,10 +63,11 @@ TEST(DeadZone, IsNamedBetweenTheDutiesThatWereTried) {
     ASSERT_TRUE(found.dead_zone) << seed;
     EXPECT_EQ(found.dead_zone->from_duty, 0.06);
     EXPECT_EQ(found.dead_zone->to_duty, 0.1);
-    EXPECT_THAT(found.warnings, Contains(AllOf(kStandsStill, HasSubstr("set the robot's dead_zone_duty"))));
+    EXPECT_THAT(found.warnings,
+                Contains(AllOf(kStandsStill, HasSubstr("dead_zone_duty to 0.06 and doubtful_duty to 0.1"))));
     const auto doubt = std::ranges::find(found.doubts, DoubtCode::dead_zone, &Doubt::code);
     ASSERT_NE(doubt, found.doubts.end());
-    EXPECT_DOUBLE_EQ(*doubt->value, 0.08);
+    EXPECT_EQ(doubt->value, 0.06);
     EXPECT_TRUE(is_grave(*doubt)) << "for a robot that does not know of it";
     EXPECT_EQ(doubt->widening, 1);
   }

@@ -302,9 +302,9 @@ StepFinding judge_dead_zone(const DeadZoneFacts& facts) {
     finding.verdict = Verdict::attention;
     finding.action = fmt::format(
         "watch the propeller at a duty of {:.2f}: if it stands still, set `dead_zone` in {} to {:.2f}, or the "
-        "parameter "
-        "dead_zone_duty; if it turns, the motion is lost in the noise",
-        zone->still, kSettings, zone->middle());
+        "parameters dead_zone_duty to {:.2f} and doubtful_duty to {:.2f} at least; if it turns, the motion is lost in "
+        "the noise",
+        zone->still, kSettings, zone->middle(), zone->still, zone->moving);
   }
   return finding;
 }
