@@ -8,8 +8,14 @@ namespace {
 
 // The constants of robot_fw/core/estimator.cpp, by their names there.
 constexpr int kTicksPerMeasurement = 5;
-constexpr double kStartVelocityM_S = 0.0005, kGainWalk = 0.003, kAgeS = 0.004, kSlip = 0.15;
-constexpr double kShapeCorrelationS = 0.1, kRestingModelM_S = 0.0003;
+constexpr double kStartVelocityM_S = 0.0005, kGainWalk = 0.003, kSlip = 0.15, kRestingModelM_S = 0.0003;
+
+struct ModelDoubt {
+  double lag_s, correlation_s;
+};
+constexpr ModelDoubt kOfTheFluid{0.004, 0.1}, kAssumed{0.025, 0.5};
+
+constexpr double kFastestNoise = 1.6;  // mean of the largest of five readings' noise, in its sds
 
 constexpr double kInterval_s = kTicksPerMeasurement * kEstimateTick_s;
 
@@ -22,8 +28,12 @@ double section_share(double time_constant_s) {
   return 12 * x / (12 + 6 * x + x * x);
 }
 
+double shape_correlation_s(bool is_confirmed) { return (is_confirmed ? kOfTheFluid : kAssumed).correlation_s; }
+
 EstimatorCovariance::EstimatorCovariance(const EstimateParameters& parameters)
-    : parameters_{parameters}, gain_m_s_{parameters.gain_m_s.data()} {
+    : parameters_{parameters},
+      gain_m_s_{parameters.gain_m_s.data()},
+      fastest_change_m_s2_{kFastestNoise * parameters.noise_m_s2} {
   covariance_(1, 1) = square(kStartVelocityM_S);
   covariance_(2, 2) = square(parameters.bias_m_s2);
   auto of_gains = covariance_.bottomRightCorner<kEstimateSections, kEstimateSections>();
@@ -44,7 +54,8 @@ bool EstimatorCovariance::step(double duty, double change_m_s) {
   propagate();
   compare();
   ticks_ = 0;
-  velocity_variance_ = fastest_change_m_s2_ = 0;
+  velocity_variance_ = 0;
+  fastest_change_m_s2_ = kFastestNoise * parameters_.noise_m_s2;
   return true;
 }
 
@@ -64,15 +75,17 @@ void EstimatorCovariance::propagate() {
       square(kGainWalk) * kInterval_s * gain_m_s_ * gain_m_s_.transpose();
 }
 
+bool EstimatorCovariance::is_at_rest() const { return duty_ == 0 && std::abs(model_m_s_) < kRestingModelM_S; }
+
 double EstimatorCovariance::velocity_floor_m_s() const {
-  const bool is_at_rest = duty_ == 0 && std::abs(model_m_s_) < kRestingModelM_S;
-  return is_at_rest ? parameters_.resting_velocity_m_s : parameters_.driven_velocity_m_s;
+  return is_at_rest() ? parameters_.resting_velocity_m_s : parameters_.driven_velocity_m_s;
 }
 
 // (3)
 void EstimatorCovariance::compare() {
-  const double shape = square(parameters_.shape_error * model_m_s_) + square(kAgeS * fastest_change_m_s2_);
-  const double area = parameters_.correlation_s * square(velocity_floor_m_s()) + kShapeCorrelationS * shape;
+  const ModelDoubt& doubt = parameters_.is_confirmed || is_at_rest() ? kOfTheFluid : kAssumed;
+  const double shape = square(parameters_.shape_error * model_m_s_) + square(doubt.lag_s * fastest_change_m_s2_);
+  const double area = parameters_.correlation_s * square(velocity_floor_m_s()) + doubt.correlation_s * shape;
   Errors h = Errors::Zero();
   h(1) = 1;
   for (std::size_t i = 0; i < kEstimateSections; ++i) h(3 + static_cast<Eigen::Index>(i)) = -section_[i];

@@ -26,7 +26,7 @@ struct EstimateParameters {
   std::array<double, kEstimateSections> gain_m_s{};                       // per duty; no sd
   std::array<double, kEstimateSections> time_constant_s{1, 1, 1, 1};      // no sd
   bool is_confirmed = false;                                              // the model is that of the fluid
-  double gain_error = 0.2, section_error = 0.12, shape_error = 0.05;      // relative
+  double gain_error = 0.2, section_error = 0.1, shape_error = 0.05;       // relative
   double driven_velocity_m_s = 0.0004, resting_velocity_m_s = 0.0001;     // of the model's velocity
   double correlation_s = 0.5;                                             // of these two; no sd
   double noise_m_s2 = 0.013, bias_m_s2 = 0.003, bias_walk_m_s2 = 0.0003;  // of a reading; the last in 1 s
@@ -34,6 +34,9 @@ struct EstimateParameters {
 
 // 1 - e^-(tick/τ), as the robot computes it.
 double section_share(double time_constant_s);
+
+// For so long an error of the model's shape keeps its sign.
+double shape_correlation_s(bool is_confirmed);
 
 class EstimatorCovariance {
  public:
@@ -56,6 +59,7 @@ class EstimatorCovariance {
   double position_sd_m() const;
 
  private:
+  bool is_at_rest() const;
   void propagate();
   void compare();
 
@@ -65,8 +69,9 @@ class EstimatorCovariance {
   Errors gains_ = Errors::Zero();
   std::array<double, kEstimateSections> section_{};
   double duty_ = 0, model_m_s_ = 0;
-  int ticks_ = 0;                                           // since the last (3), and what came in since then:
-  double velocity_variance_ = 0, fastest_change_m_s2_ = 0;  // (m/s)²
+  int ticks_ = 0;                 // since the last (3), and what came in since then:
+  double velocity_variance_ = 0;  // (m/s)²
+  double fastest_change_m_s2_;    // of the velocity, noise included
 };
 
 }  // namespace control

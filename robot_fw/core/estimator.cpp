@@ -15,14 +15,19 @@ constexpr float kGainWalk = 0.003F;           // sd of the gain's change in 1 s
 constexpr float kLostM = 10;                  // sd of the position after a restart
 constexpr float kLostM_S = 0.5F;              // of the velocity then; water's model reaches 0.35 m/s
 
-// Of a reading: sd of its age, and of the velocity that repeated and skipped ones cost, relative to a tick's change.
-constexpr float kAgeS = 0.004F;
-constexpr float kSlip = 0.15F;
+constexpr float kSlip =
+    0.15F;  // sd of the velocity that repeated and skipped readings cost, relative to a tick's change
 // Of the model's change in a tick without a reading: sd, relative, and in m/s².
 constexpr float kUnsensedShare = 0.3F;
 constexpr float kUnsensedM_S2 = 0.02F;
 
-constexpr float kShapeCorrelationS = 0.1F;   // for so long an error of the model's shape keeps its sign
+// By how much the model may lag (sd; with the fluid's own model a reading's age is all), and for how long the error of
+// its shape keeps its sign.
+struct ModelDoubt {
+  float lag_s, correlation_s;
+};
+constexpr ModelDoubt kOfTheFluid{0.004F, 0.1F}, kAssumed{0.025F, 0.5F};
+
 constexpr float kRestingModelM_S = 0.0003F;  // below it the modelled velocity has died down
 constexpr float kStillM_S2 = 0.01F;          // below it nothing is felt but noise and bias
 constexpr float kDoubt = 0.6F;               // share of the doubtful way that is one sd
@@ -274,10 +279,12 @@ void Estimator::admit_drift() {
 }
 
 // Of ε in (3), as white noise.
-float Estimator::measurement_variance() const {
+float Estimator::measurement_variance(bool is_confirmed) const {
+  const ModelDoubt& doubt = is_confirmed || at_rest() ? kOfTheFluid : kAssumed;
   const float floor_m_s = at_rest() ? parameters_.resting_velocity_m_s : parameters_.driven_velocity_m_s;
-  const float shape = square(parameters_.shape_error * model_m_s_) + square(kAgeS * interval_.fastest_change_m_s2);
-  const float area = parameters_.correlation_s * (square(floor_m_s) + square(flow_m_s_)) + kShapeCorrelationS * shape;
+  const float shape =
+      square(parameters_.shape_error * model_m_s_) + square(doubt.lag_s * interval_.fastest_change_m_s2);
+  const float area = parameters_.correlation_s * (square(floor_m_s) + square(flow_m_s_)) + doubt.correlation_s * shape;
   return 2 * area / interval_.duration_s;
 }
 
@@ -294,8 +301,8 @@ bool Estimator::compare_with_model() {
   for (std::size_t i = 0; i < kStates; ++i) ph[i] = times_h(p[i]);
   float variance = times_h(ph);                    // H P Hᵀ
   if (!may_be_one(p, ph, variance)) return false;  // SAFETY: what comes of such a one is certain of anything
-  variance += measurement_variance();
-  const float surprise = surprise_ = square(innovation) / variance;
+  const float surprise = surprise_ = square(innovation) / (variance + measurement_variance(true));
+  variance += measurement_variance(parameters_.is_confirmed);
   const bool moving = std::fabs(model_m_s_) > kRestingModelM_S;
   if (surprise > kSurprising && moving && flow_m_s_ == 0 && gain_variance() < 1) {  // the gain is quite another
     float nominal_m_s = 0;

@@ -5,14 +5,16 @@
 //                                                                        v' = v_m'
 //   0 = v - v_m - d + ε                                            (3)   a measurement in every fifth tick
 //   p → position, v → velocity, b → bias (random walk), δ_i → error of a section's gain (constant), d → drift with a
-//   pulsating flow (0 without one);  u → duty;  ε → `shape_error` · v_m, a reading's age times a, and a floor
+//   pulsating flow (0 without one);  u → duty;  ε → `shape_error` · v_m, a lag times a, and a floor
 //
 // - The model's gain may be off by ±20 %: all δ_i alike (sd `gain_error` · g_i); it is known within a few percent
 //   once the robot has moved. A measurement beyond 3 sd raises its variance again, so that the filter also finds the
 //   gain of another fluid; that is a model_mismatch, as are lasting surprises.
 // - A model that nobody has confirmed for this fluid may have another shape as well: each δ_i has an sd of its own,
 //   `section_error` · Σ g. The sections span 0.03 s to 15 s, so driving finds most of another fluid's shape, and
-//   position_sd_m includes the part that is still unknown.
+//   position_sd_m includes the part that is still unknown. What four sections cannot follow of it in the first seconds
+//   is ε's: a lag of 25 ms (sd), and 0.5 s for which an error of the shape keeps its sign (4 ms, the age of a reading,
+//   and 0.1 s with a confirmed model). What is surprising is judged as with a confirmed one.
 // - With the motor off and v_m died down, (3) has a smaller floor: the zero-velocity update.
 // - Errors of (3) keep their sign for `correlation_s` and more. They are treated as white noise of the same area,
 //   variance · 2 correlation / interval.
@@ -63,7 +65,7 @@ struct EstimatorParameters {
   float doubtful_duty = 0.05F;           // below it the motor may stand still
   bool is_confirmed = false;             // the model is that of the fluid that the robot swims in
   float gain_error = 0.2F;               // of all gains alike, relative, at the start
-  float section_error = 0.12F;           // of each single gain, relative to the steady gain, unless confirmed
+  float section_error = 0.1F;            // of each single gain, relative to the steady gain, unless confirmed
   float shape_error = 0.05F;             // of the model's velocity, relative to it, whatever its gain
   float driven_velocity_m_s = 0.0004F;   // of the model's velocity, whatever it is
   float resting_velocity_m_s = 0.0001F;  // the same with the motor off
@@ -140,7 +142,7 @@ class Estimator {
   void propagate_modelled();
   void let_drift_die_down();
   void admit_drift();
-  float measurement_variance() const;
+  float measurement_variance(bool is_confirmed) const;
   bool compare_with_model();  // false: the covariance is no longer valid
   void correct(const Vector& gains, const Vector& ph, float variance, float innovation);
   void watch_model(float surprise);

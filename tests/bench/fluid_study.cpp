@@ -1,5 +1,6 @@
-// Prints how well the robot knows its position in fluids whose model it was told: fluid_study [FLUIDS] [SEEDS]; or in
-// how many fluids four sections make a model: fluid_study models.
+// Prints how well the robot knows its position in fluids whose model it was told: fluid_study [FLUIDS] [SEEDS]; in how
+// many fluids four sections make a model: fluid_study models; or how well it knows it in each second where it was told
+// nothing: fluid_study first_seconds [FLUIDS] [SEEDS] [DRAW].
 //
 // Figure 7's loop on the estimate, default sensor, the model of control/discretisation/estimator_model, confirmed.
 // Fluids are drawn as in tests/control/fluid_family.hpp until so many have a model; those that have none are counted.
@@ -65,6 +66,30 @@ void print(const Tally& tally) {
       100.0 * tally.sds_to_7_mm / std::max(tally.trials, 1), 1e3 * tally.largest_error_m, 1e3 * tally.largest_sd_m);
 }
 
+// Without a model of the fluid: the fluids in which a second has less than 80 % of seeds within 2 sd.
+void print_first_seconds(int fluids, int seeds, unsigned draw) {
+  constexpr std::size_t kSeconds = 42;
+  int seconds_below = 0, fluids_below = 0;
+  double within = 0, least = 1;
+  for (const control::FractionalModel& fluid : control::fluid_family(fluids, draw)) {
+    robot_fw::EstimatorTrial trial{.truth = fluid, .estimator = {}, .closed_loop = true, .disturbance_m = -0.05};
+    std::vector<double> shares(kSeconds, 0.0);
+    for (int seed = 1; seed <= seeds; ++seed) {
+      const auto seconds = robot_fw::run_trial(trial, static_cast<std::uint64_t>(seed)).seconds_within;
+      for (std::size_t at = 0; at < kSeconds; ++at) shares[at] += seconds[at] ? 1.0 / seeds : 0;
+    }
+    for (const double share : shares) within += share / static_cast<double>(kSeconds) / fluids;
+    const auto below = std::ranges::count_if(shares, [](double share) { return share < 0.8 - 1e-9; });
+    seconds_below += static_cast<int>(below);
+    fluids_below += below > 0 ? 1 : 0;
+    least = std::min(least, std::ranges::min(shares));
+  }
+  std::printf(
+      "%d fluids, draw %u, %d seeds: %.2f %% of seconds within 2 sd; the least second %.0f %%; below 80 %%: "
+      "%d seconds in %d fluids\n",
+      fluids, draw, seeds, 100 * within, 100 * least, seconds_below, fluids_below);
+}
+
 double overshoot(const control::FractionalModel& fluid) {
   std::vector<double> time_s;
   for (double time = 0.01; time < 60; time *= 1.02) time_s.push_back(time);
@@ -96,6 +121,11 @@ int main(int argc, char** argv) {
   if (argc > 1 && std::strcmp(argv[1], "models") == 0) {
     print_models("drawn", control::fluid_family(1000, 1));
     print_models("ends and middles", control::fluid_family_corners());
+    return 0;
+  }
+  if (argc > 1 && std::strcmp(argv[1], "first_seconds") == 0) {
+    const auto number = [argc, argv](int at, int otherwise) { return argc > at ? std::atoi(argv[at]) : otherwise; };
+    print_first_seconds(number(2, 80), number(3, 10), static_cast<unsigned>(number(4, 20261129)));
     return 0;
   }
   const int fluids = argc > 1 ? std::atoi(argv[1]) : 20, seeds = argc > 2 ? std::atoi(argv[2]) : 10;

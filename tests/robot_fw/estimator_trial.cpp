@@ -55,7 +55,6 @@ TrialResult run_trial(const EstimatorTrial& trial, std::uint64_t seed) {
   TrialResult result;
   float duty = 0;
   const auto ticks = std::lround(trial.duration_s / kTickS);
-  int seconds_within = 0;
   for (long tick = 1; tick <= ticks; ++tick) {
     world.step(static_cast<double>(duty));
     const Inputs inputs = world.read(0);
@@ -74,9 +73,10 @@ TrialResult run_trial(const EstimatorTrial& trial, std::uint64_t seed) {
     result.position_sd_m = static_cast<double>(estimator.position_sd_m());
     if (result.mismatch_s < 0 && estimator.model_mismatch()) result.mismatch_s = time_s;
     const bool within = std::abs(result.estimate_error_m) <= 2 * result.position_sd_m;
-    if (tick % 100 == 0 && within) ++seconds_within;
+    if (tick % 100 == 0) result.seconds_within.push_back(within);
   }
-  result.share_within = seconds_within / std::floor(trial.duration_s);
+  result.share_within =
+      static_cast<double>(std::ranges::count(result.seconds_within, true)) / std::floor(trial.duration_s);
   return result;
 }
 

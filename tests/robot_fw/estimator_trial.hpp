@@ -36,6 +36,7 @@ struct TrialResult {
   double position_sd_m = 0;     // at the end
   double mismatch_s = -1;       // when first said; -1: never
   double share_within = 0;      // of all seconds, the estimate within 2 sd of the truth
+  std::vector<bool> seconds_within;
 };
 
 TrialResult run_trial(const EstimatorTrial& trial, std::uint64_t seed);

@@ -24,7 +24,7 @@ inline constexpr float kMaxModelTimeConstant_s = 1000;
 inline constexpr double kMaxModelFitError = 0.005;
 // sd of each gain by itself, a share of their sum, of a model that is assumed only: at least that of a robot that
 // does not know its fluid (docs/robot.md). SAFETY: a robot whose model is in doubt is as unsure as one without.
-inline constexpr float kAssumedSectionError = 0.12F;
+inline constexpr float kAssumedSectionError = 0.1F;
 
 struct FluidModel {
   using Numbers = std::array<float, kFluidModelSections>;
