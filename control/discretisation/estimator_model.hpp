@@ -9,8 +9,8 @@
 // times are dense early and spaced evenly in ln t later, up to 60 s, with the final velocity beside them, so that the
 // model is right for as long as the motor runs. T = 10 ms → kEstimatorPeriodS. The gains, summed, cancel: they are kept
 // within ±10 v_∞, so that float32 costs a fit error of 1e-5 at most, and within what the robot's parameters may be.
-// What is returned are float32 values. Their fit error is the largest over all times from 10 ms to 60 s, also between
-// the ticks: (2) in float32 at the ticks that are compared, and with (1 - σ_i)^(t/T) in every peak between.
+// The values that are returned are float32. Their fit error is the largest over all times from 10 ms to 60 s, also
+// between the ticks: (2) in float32 at the ticks that are compared, and with (1 - σ_i)^(t/T) in every peak between.
 //
 // Reach:    sections have real poles. Plants that overshoot by a percent or more cannot be met by four of them:
 //           is_met is false then, and `reason` says so. With b1, b2 of (29) halved to doubled, orders

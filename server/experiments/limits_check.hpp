@@ -19,7 +19,7 @@ inline constexpr double kBetweenRuns_s = 10;  // with until: for a fit, as a rul
 // The longest time in auto without a break, of all runs.
 double longest_auto_s(const Profile& profile);
 
-// What a profile asks of a robot, over all its runs; steps count from 1.
+// The extremes that a profile asks of a robot, over all its runs; steps count from 1.
 struct Demands {
   double duty_min = 0;
   std::size_t duty_step = 0;
@@ -31,7 +31,7 @@ struct Demands {
 };
 Demands demands_of(const Profile& profile);
 
-// What a robot takes, as far as it is known.
+// The limits beyond which a robot refuses a command, as far as they are known.
 struct RobotLimits {
   bool has_reverse = true;  // false where the controller in force has duty_min 0, as for a motor without reverse
   float setpoint_min_m = -std::numeric_limits<float>::infinity();

@@ -59,7 +59,7 @@ std::string source_in_words(std::span<const analysis::MeasuredStep> steps,
   return fmt::format("{}, in {} of {} steps; in the others {}", measured, outside, steps.size(), own);
 }
 
-// What steers in the prediction.
+// The controller of the prediction, and where it is from.
 struct Steering {
   bool is_runs_own = false;
   control::Discretisation controller;  // of a run's own: period, sections and DC gain alone

@@ -26,9 +26,9 @@ void add_options(CLI::App& command, RunChoice& choice);
 std::vector<storage::StoredSample> read_samples(const RunChoice& choice);
 std::optional<storage::StoredReference> read_reference(const RunChoice& choice);  // none: the run has none
 analysis::RunSamples read_run_samples(const RunChoice& choice);                   // with both
-// Of the controller that the robot had when the run began; none: not known.
+// The checksum of the controller that the robot had when the run began; none: not known.
 std::optional<std::uint32_t> read_controller_checksum(const RunChoice& choice);
-// Of the one in force at a sample of a span; none: not known.
+// The controller in force at a sample of a span; none: not known.
 std::optional<protocol::Controller> read_controller(const RunChoice& choice, std::uint32_t span, std::uint64_t seq);
 
 }  // namespace server::cli

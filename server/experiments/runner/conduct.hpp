@@ -33,7 +33,7 @@ inline constexpr const char* kRightEnded = "right_ended";  // of who it acts for
 
 Profile way_back();  // one setpoint, to 0
 
-// What a robot says that it takes; null: it has said nothing.
+// The limits that a robot has reported; null: it has reported none.
 RobotLimits limits_of(const station::RobotSettings* settings);
 
 // The controller of a name that a profile mentions, for this robot. Errors say what is wrong with the name.
