@@ -2,11 +2,13 @@
 #include "server/cli/design/bode.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ostream.h>
 
 #include <CLI/CLI.hpp>
 
 #include "control/tuning/design.hpp"
 #include "server/analysis/control_json.hpp"
+#include "server/analysis/tuning/margin_sigmas.hpp"
 #include "server/cli/terminal/exit_status.hpp"
 #include "server/cli/terminal/options.hpp"
 
@@ -119,14 +121,17 @@ int run(const Bode& options, std::ostream& out) {
     return 0;
   }
   const BothMargins margins = margins_of(options, loop);
+  const auto sigmas = analysis::margin_sigmas(loop, margins.continuous, plant.uncertainty);
   if (options.form.is_json) {
     if (!options.points && (options.from_rad_s || options.to_rad_s)) {
       throw UsageError{"--from-rad-s and --to-rad-s belong to the response, which --json has with --points"};
     }
     analysis::OrderedJson answer = analysis::json_of(margins.continuous);
+    analysis::add_margin_sigmas(sigmas, answer);
     answer["sampled"] = analysis::json_of(margins.sampled);
     answer["sampled"]["period_s"] = options.period_s;
     answer["plant"] = analysis::json_of(loop.plant);
+    analysis::add_plant_doubts(plant.doubts, answer);
     answer["controller"] = analysis::json_of(loop.controller);
     answer["velocity_loop"] = options.is_velocity_loop;
     if (options.points)
@@ -136,6 +141,7 @@ int run(const Bode& options, std::ostream& out) {
     return 0;
   }
   write_margins(out, options, margins);
+  if (margins.continuous.is_closed_loop_stable) say_margin_sigmas(out, options.plant, sigmas);
   out << '\n';
   Table table{{"omega (rad/s)", "magnitude (dB)", "phase (deg)"}};
   for (const auto& point : response(options, loop, options.points.value_or(kTablePoints))) {

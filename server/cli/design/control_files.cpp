@@ -2,6 +2,7 @@
 #include "server/cli/design/control_files.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ostream.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -15,6 +16,7 @@
 #include "server/analysis/motion_at_start.hpp"
 #include "server/cli/terminal/input.hpp"
 #include "server/cli/terminal/options.hpp"
+#include "server/cli/terminal/output.hpp"
 #include "server/storage/samples/position_sd.hpp"
 
 namespace server::cli {
@@ -62,6 +64,20 @@ Plant read(const PlantChoice& choice) {
 void say_doubts(const PlantChoice& choice, const Plant& plant) {
   const std::string words = analysis::doubts_in_words(plant.doubts);
   if (!words.empty()) fmt::print(stderr, "rheonaut: warning: {}: {}\n", *choice.file, words);
+}
+
+void say_margin_sigmas(std::ostream& out, const PlantChoice& choice,
+                       const std::optional<control::MarginUncertainty>& sigmas) {
+  if (!choice.file || *choice.file == "newtonian" || *choice.file == "non_newtonian") return;
+  if (!sigmas) {
+    fmt::print(out, "the sigmas of the plant's parameters are not known: the margin takes them as exact\n");
+    return;
+  }
+  fmt::print(out,
+             "by the sigmas of the plant's fit (± 2 sd): phase margin ± {} deg, gain crossover ± {} rad/s, "
+             "phase slope ± {} deg/(rad/s)\n",
+             cell(2 * sigmas->phase_margin_deg, 2), cell(2 * sigmas->gain_crossover_rad_s, 2),
+             cell(2 * sigmas->phase_slope_deg_per_rad_s, 2));
 }
 
 control::FopdController read(const ControllerChoice& choice) {

@@ -4,11 +4,13 @@
 #pragma once
 
 #include <optional>
+#include <ostream>
 #include <string>
 
 #include "control/identification/identify.hpp"
 #include "control/identification/planned_experiment.hpp"
 #include "control/models/transfer_function.hpp"
+#include "control/tuning/margin_uncertainty.hpp"
 #include "server/analysis/control_json.hpp"
 #include "server/analysis/csv_columns.hpp"
 #include "server/analysis/run_recording.hpp"
@@ -40,6 +42,10 @@ struct Plant {
 Plant read(const PlantChoice& choice);  // once, since it may be a pipe; none: (29)
 // In one line on standard error, where something is in doubt that widens what is computed from the plant.
 void say_doubts(const PlantChoice& choice, const Plant& plant);
+
+// ± 2 sd of margin, crossover and phase slope, or that they are not known; nothing for the paper's models.
+void say_margin_sigmas(std::ostream& out, const PlantChoice& choice,
+                       const std::optional<control::MarginUncertainty>& sigmas);
 
 control::FopdController read(const ControllerChoice& choice);  // none: (30)
 

@@ -81,22 +81,6 @@ void write_ranges(std::ostream& out, const Tune& options, const Ranges& ranges) 
              ranges_in_words(ranges));
 }
 
-// ± 2 sd of margin, crossover and phase slope, or that they are not known; nothing for the paper's models.
-void write_margin_sigmas(std::ostream& out, const PlantChoice& choice, const Plant& plant,
-                         const control::TuningResult& result) {
-  if (!choice.file || *choice.file == "newtonian" || *choice.file == "non_newtonian") return;
-  const auto sigmas = analysis::margin_sigmas(plant.model, result, plant.uncertainty);
-  if (!sigmas) {
-    fmt::print(out, "the sigmas of the plant's parameters are not known: the margin takes them as exact\n");
-    return;
-  }
-  fmt::print(out,
-             "by the sigmas of the plant's fit (± 2 sd): phase margin ± {} deg, gain crossover ± {} rad/s, "
-             "phase slope ± {} deg/(rad/s)\n",
-             cell(2 * sigmas->phase_margin_deg, 2), cell(2 * sigmas->gain_crossover_rad_s, 2),
-             cell(2 * sigmas->phase_slope_deg_per_rad_s, 2));
-}
-
 analysis::OrderedJson answer_of(const Tune& options, const Plant& plant, const control::TuningResult& result,
                                 const Ranges& ranges) {
   analysis::OrderedJson answer = analysis::tuning_json(plant.model, options.spec, result, ranges);
@@ -215,7 +199,7 @@ int run(const Tune& options, std::ostream& out) {
     write_json(out, answer_of(options, plant, result, ranges));
   } else if (result.tuned) {
     write_asked_and_achieved(out, options, *result.tuned);
-    write_margin_sigmas(out, options.plant, plant, result);
+    say_margin_sigmas(out, options.plant, analysis::margin_sigmas(plant.model, result, plant.uncertainty));
     write_ranges(out, options, ranges);
     if (options.with_robustness) write_robustness(out, robustness_of(plant.model, result.tuned->controller));
   } else {

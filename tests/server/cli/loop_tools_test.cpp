@@ -52,6 +52,26 @@ TEST_F(LoopTools, AMarginIsAsUncertainAsTheDoubtsOfItsModelMakeIt) {
   EXPECT_NEAR(old["achieved"]["phase_margin_sigma_deg"].get<double>(), narrow_deg, 1e-12);
 }
 
+TEST_F(LoopTools, BodeStatesTheSameUncertaintyOfALoopAsTuneDoes) {
+  const std::string late = R"(, "doubts": [{"code": "dead_time_not_determined", "value": 0.005, "widening": 1}])";
+  save("fit.json", fit_with(late));
+  const auto tuned = ask("tune --plant @fit.json --crossover-rad-s 5 --phase-margin-deg 91 --json");
+  save("controller.json", tuned.text);
+  const std::string bode = "bode --plant @fit.json --controller @controller.json";
+  const auto json = ask(bode + " --json").json();
+  for (const char* sigma : {"phase_margin_sigma_deg", "crossover_sigma_rad_s", "phase_slope_sigma_deg_per_rad_s"}) {
+    const double of_tune = tuned.json()["achieved"][sigma];
+    EXPECT_GT(of_tune, 0);
+    EXPECT_NEAR(json[sigma].get<double>(), of_tune, 1e-6 * of_tune) << sigma;
+  }
+  EXPECT_THAT(json["plant_doubts_text"].get<std::string>(), HasSubstr("one sigma of it is 5 ms"));
+  EXPECT_THAT(ask(bode).text, HasSubstr("by the sigmas of the plant's fit (± 2 sd): phase margin ± "));
+  EXPECT_EQ(ask("bode --json").json()["phase_margin_sigma_deg"], nullptr) << "the paper's";
+  EXPECT_THAT(ask("bode").text, Not(HasSubstr("sigmas")));
+  save("bare.json", R"({"kp":0.1,"b1":0.01,"b2":0.1,"alpha":1.7,"beta":0.9})");
+  EXPECT_THAT(ask("bode --plant @bare.json").text, HasSubstr("the sigmas of the plant's parameters are not known"));
+}
+
 TEST_F(LoopTools, AModelInGraveDoubtIsForTheRobotToAssume) {
   save("fit.json",
        fit_with(R"(, "doubts": [{"code": "no_linear_model_over_amplitude", "value": 0.5, "widening": 14}])"));
