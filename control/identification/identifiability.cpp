@@ -180,11 +180,17 @@ std::vector<std::size_t> undetermined_parameters(const Fit& fit) {
 std::vector<std::size_t> parameters_at_bound(const Fit& fit) {
   std::vector<std::size_t> found;
   if (fit.structure != Structure::fractional || fit.starts == 0) return found;
-  for (const std::size_t i : {std::size_t{3}, std::size_t{4}}) {
-    const double beyond_lower = parameters_of(fit.model)[i] - lower_bound_of(i);
-    if (beyond_lower <= kNearBound || beyond_lower >= 1 - kNearBound) found.push_back(i);
+  const auto values = parameters_of(fit.model);
+  for (std::size_t i = 0; i < kParameters; ++i) {
+    if (lies_at_bound(i, values[i])) found.push_back(i);
   }
   return found;
+}
+
+bool lies_at_bound(std::size_t parameter, double value) {
+  if (!is_order(parameter)) return false;
+  const double beyond_lower = value - lower_bound_of(parameter);
+  return beyond_lower <= kNearBound || beyond_lower >= 1 - kNearBound;
 }
 
 bool describes_run(const Fit& fit) {

@@ -29,6 +29,7 @@ bool is_order(std::size_t parameter);
 std::array<double, kParameters> parameters_of(const FractionalModel& model);
 std::vector<std::size_t> undetermined_parameters(const Fit& fit);
 std::vector<std::size_t> parameters_at_bound(const Fit& fit);
+bool lies_at_bound(std::size_t parameter, double value);  // an order that was fitted: its sigma means little there
 
 // A fit that is poor in percent describes the run nevertheless where only the accelerometer's white noise is left.
 bool describes_run(const Fit& fit);

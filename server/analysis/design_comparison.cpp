@@ -10,6 +10,7 @@
 #include <optional>
 #include <vector>
 
+#include "control/identification/identifiability.hpp"
 #include "server/analysis/optional_json.hpp"
 
 namespace server::analysis {
@@ -19,6 +20,7 @@ struct Parameter {
   const char* name;
   double value = 0;
   std::optional<double> one_sigma;
+  bool is_at_bound = false;  // where its sigma means little
 };
 
 struct Compared {
@@ -42,7 +44,9 @@ Result<Compared> parameters_of(const storage::Design& design) {
   std::vector<Parameter> parameters;
   for (std::size_t i = 0; i < control::kParameters; ++i) {
     parameters.push_back({control::kParameterNames[i], values[i], {}});
-    if (*uncertainty) parameters.back().one_sigma = (*uncertainty)->one_sigma[i];
+    if (!*uncertainty) continue;
+    parameters.back().one_sigma = (*uncertainty)->one_sigma[i];
+    parameters.back().is_at_bound = parameters.back().one_sigma && control::lies_at_bound(i, values[i]);
   }
   parameters.push_back({"dead_time_s", model.dead_time_s, {}});
   return Compared{std::move(parameters), *uncertainty};
@@ -80,6 +84,7 @@ OrderedJson row_of(const std::vector<Compared>& all, std::size_t index) {
     const bool compares = has_same_unit(one, all.front(), first.name);
     row["values"].push_back(parameter.value);
     row["one_sigma"].push_back(or_null(parameter.one_sigma));
+    row["at_bound"].push_back(parameter.is_at_bound);
     row["relative_to_first"].push_back(
         or_null(compares ? relative_difference(parameter.value, first.value) : std::nullopt));
     row["sigmas_from_first"].push_back(or_null(sigmas_between(parameter, first)));

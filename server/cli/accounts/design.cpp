@@ -6,6 +6,7 @@
 #include <fmt/ranges.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <limits>
 #include <stdexcept>
 
@@ -118,15 +119,24 @@ int compare(const DesignCommand& options, std::ostream& out) {
     fmt::print(out, "{}\n", answer.dump(2));
     return 0;
   }
-  Table table{{"<parameter", "design", "value", "one sigma", "difference (%)", "in sigmas"}};
+  const auto is_at_bound = [](const json& at_bound) { return at_bound == true; };
+  std::vector<std::string> head{"<parameter", "design", "value", "one sigma", "difference (%)", "in sigmas"};
+  const bool has_bound = std::ranges::any_of(answer.at("parameters"), [&](const json& parameter) {
+    return std::ranges::any_of(parameter.at("at_bound"), is_at_bound);
+  });
+  if (has_bound) head.emplace_back("<that sigma");
+  Table table{std::move(head)};
   for (const json& parameter : answer.at("parameters")) {
     for (std::size_t i = 0; i < answer.at("designs").size(); ++i) {
       const json& relative = parameter.at("relative_to_first")[i];
-      table.row({i == 0 ? parameter.at("name").get<std::string>() : "",
-                 id_text(answer.at("designs")[i].at("design_id")), number_text(parameter.at("values")[i], "{:.6g}"),
-                 number_text(parameter.at("one_sigma")[i], "{:.2g}"),
-                 relative.is_null() ? "-" : fmt::format("{:.2f}", 100 * relative.get<double>()),
-                 number_text(parameter.at("sigmas_from_first")[i], "{:.1f}")});
+      std::vector<std::string> row{i == 0 ? parameter.at("name").get<std::string>() : "",
+                                   id_text(answer.at("designs")[i].at("design_id")),
+                                   number_text(parameter.at("values")[i], "{:.6g}"),
+                                   number_text(parameter.at("one_sigma")[i], "{:.2g}"),
+                                   relative.is_null() ? "-" : fmt::format("{:.2f}", 100 * relative.get<double>()),
+                                   number_text(parameter.at("sigmas_from_first")[i], "{:.1f}")};
+      if (has_bound) row.emplace_back(is_at_bound(parameter.at("at_bound")[i]) ? kSigmaAtBound : "");
+      table.row(std::move(row));
     }
   }
   table.write(out);

@@ -169,7 +169,7 @@ void write_parameters(std::ostream& out, const Fit& fit, bool is_of_one_run) {
     std::vector<std::string> row{kParameterNames[i], cell(values[i], 8), cell(fit.one_sigma[i], 3)};
     if (!at_bound.empty()) {
       const bool is_at_bound = std::ranges::find(at_bound, i) != at_bound.end();
-      row.emplace_back(is_at_bound ? "means little: the parameter lies at its bound" : "");
+      row.emplace_back(is_at_bound ? kSigmaAtBound : "");
     }
     table.row(std::move(row));
   }

@@ -219,15 +219,25 @@ void write_knowledge(std::ostream& out, const json& experiment) {
   const auto first = std::ranges::find_if(runs, with);
   if (first == runs.end()) return;
   const auto parameter = first->at("knowledge").at("parameter").get<std::string>();
-  Table table{{"run", "step", "duty ×", parameter, fmt::format("sigma({})", parameter), "fit (%)", "job"}};
+  const auto is_at_bound = [&with](const json& run) {
+    return with(run) && run.at("knowledge").value("at_bound", false);
+  };
+  const bool has_bound = std::ranges::any_of(runs, is_at_bound);
+  std::vector<std::string> head{"run",     "step", "duty ×", parameter, fmt::format("sigma({})", parameter),
+                                "fit (%)", "job"};
+  if (has_bound) head.emplace_back("<that sigma");
+  Table table{std::move(head)};
   for (const json& run : runs) {
     if (!with(run)) continue;
     const json &knowledge = run.at("knowledge"), &fit = knowledge.at("fit"), &variant = run.at("variant");
     const json &sigma = knowledge.at("sigma"), &value = fit.at("parameters").at(parameter);
-    table.row({std::to_string(run.at("number").get<int>()), std::to_string(variant.at("step").get<int>()),
-               cell(variant.at("duty_factor").get<double>()), value.is_null() ? "-" : cell(value.get<double>()),
-               sigma.is_null() ? "-" : cell(sigma.get<double>()), fixed(fit.at("fit_percent").get<double>(), 1),
-               std::to_string(fit.at("job_id").get<std::int64_t>())});
+    std::vector<std::string> row{
+        std::to_string(run.at("number").get<int>()),         std::to_string(variant.at("step").get<int>()),
+        cell(variant.at("duty_factor").get<double>()),       value.is_null() ? "-" : cell(value.get<double>()),
+        sigma.is_null() ? "-" : cell(sigma.get<double>()),   fixed(fit.at("fit_percent").get<double>(), 1),
+        std::to_string(fit.at("job_id").get<std::int64_t>())};
+    if (has_bound) row.emplace_back(is_at_bound(run) ? kSigmaAtBound : "");
+    table.row(std::move(row));
   }
   fmt::print(out, "\n");
   table.write(out);

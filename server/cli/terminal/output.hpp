@@ -45,6 +45,9 @@ class Table {
   std::vector<std::vector<std::string>> rows_;
 };
 
+// In a table of parameters, beside the sigma of one at its bound; the column is there where it is needed.
+inline constexpr const char* kSigmaAtBound = "means little: the parameter lies at its bound";
+
 // An outcome that is not success: says it in one line on standard error, beside whatever the answer is, and returns the
 // exit status.
 int not_done(int exit_status, std::string_view outcome);

@@ -1,10 +1,16 @@
 #include "server/experiments/adaptive/fitted_model.hpp"
 
+#include "control/identification/identifiability.hpp"
 #include "server/analysis/control_json.hpp"
 #include "server/runtime/exceptions.hpp"
 
 namespace server::experiments {
 using nlohmann::json;
+
+bool is_at_bound(const FittedModel& fitted, std::size_t parameter) {
+  const control::FractionalModel model = control::normalised(fitted.model);
+  return fitted.one_sigma[parameter] && control::lies_at_bound(parameter, control::parameters_of(model)[parameter]);
+}
 
 Result<FittedModel> fitted_model_from(storage::JobId job, const json& result) {
   try {

@@ -29,6 +29,9 @@ struct FittedModel {
   std::vector<std::string> warnings;
 };
 
+// The parameter was fitted, and lies where its sigma means little.
+bool is_at_bound(const FittedModel& fitted, std::size_t parameter);
+
 // invalid: the search found no finite model, or this is no result of a job `identify`.
 Result<FittedModel> fitted_model_from(storage::JobId job, const nlohmann::json& result);
 

@@ -121,7 +121,11 @@ std::string UntilKnown::state_in_words(const std::optional<FittedModel>& fitted)
   const char* parameter = control::kParameterNames[until.parameter];
   const std::string runs = chosen_.size() == 1 ? "1 run" : fmt::format("{} runs", chosen_.size());
   const std::optional<double> sigma = fitted ? fitted->one_sigma[until.parameter] : std::nullopt;
-  if (sigma) return fmt::format("sigma({}) is {:.2g} after {}, wanted is {:g}", parameter, *sigma, runs, until.sigma);
+  if (sigma) {
+    const bool means_little = is_at_bound(*fitted, until.parameter);
+    return fmt::format("sigma({}) is {:.2g} after {}, wanted is {:g}{}", parameter, *sigma, runs, until.sigma,
+                       means_little ? fmt::format("; it means little, since {} lies at its bound", parameter) : "");
+  }
   const bool has_converged = !fitted || fitted->end == "converged";
   return fmt::format("{} is not determined after {}{}", parameter, runs,
                      has_converged ? "" : fmt::format(" (the search ended by {})", fitted->end));
@@ -132,6 +136,7 @@ json UntilKnown::knowledge_of(const FittedModel& fitted, const std::optional<Nex
   json out = {{"parameter", control::kParameterNames[until.parameter]},
               {"target_sigma", until.sigma},
               {"sigma", or_null(fitted.one_sigma[until.parameter])},
+              {"at_bound", is_at_bound(fitted, until.parameter)},
               {"fit", to_json(fitted)},
               {"promised_sigma", nullptr},
               {"reachable_sigma", nullptr},

@@ -202,6 +202,18 @@ TEST_F(DesignRoutesTest, ComparesParametersInUnitsOfTheirUncertainty) {
   EXPECT_EQ(ask("GET", "/api/v1/design-comparison?ids=1,4").parsed()["reason"], "other_kind");
 }
 
+TEST_F(DesignRoutesTest, MarksTheSigmaOfAParameterAtItsBound) {
+  json at_bound = a_fit(0.1, 0.003);
+  at_bound["parameters"]["alpha"] = 2;
+  ASSERT_EQ(store_model("inside", a_fit(0.1, 0.003)).status, 201);
+  ASSERT_EQ(store_model("at the bound", at_bound).status, 201);
+  ASSERT_EQ(store_model("without a fit", at_bound["parameters"]).status, 201);
+  const json compared = ask("GET", "/api/v1/design-comparison?ids=1,2,3").parsed();
+  EXPECT_EQ(compared["parameters"][3]["name"], "alpha");
+  EXPECT_EQ(compared["parameters"][3]["at_bound"], json({false, true, false}));
+  EXPECT_EQ(compared["parameters"][0]["at_bound"], json({false, false, false}));
+}
+
 // Where a fit cannot tell kp from b2, they are wrong together: along that line it is the same model, across it another.
 TEST_F(DesignRoutesTest, ComparesAllParametersTogetherWithTheirCorrelations) {
   const auto fit = [](double kp, double b2) {

@@ -54,6 +54,7 @@ class UntilKnownTest : public ::testing::Test {
   runtime::WorkerThread maths_{"maths"};
   Profile profile_ = parse_profile(kProfile, "test");
   std::optional<double> sigma_;
+  double alpha_ = control::kNonNewtonianModel.alpha;
   std::string end_ = "converged";
   std::optional<Error> fails_;
   std::vector<FitRequest> asked_;
@@ -64,6 +65,7 @@ class UntilKnownTest : public ::testing::Test {
     fitted.job = 7;
     fitted.end = end_;
     fitted.model = control::kNonNewtonianModel;
+    fitted.model.alpha = alpha_;
     fitted.one_sigma[3] = sigma_;
     fitted.residual_sd = 0.05;
     co_return fitted;
@@ -87,6 +89,18 @@ TEST_F(UntilKnownTest, EndsWhenEnoughIsKnown) {
   EXPECT_EQ(until_.conclusion()->reason, "target_reached");
   EXPECT_EQ(until_.conclusion()->detail, "sigma(alpha) is 0.019 after 2 runs, wanted is 0.02");
   EXPECT_EQ(until_.knowledge().at("fit").at("job_id"), 7);
+}
+
+TEST_F(UntilKnownTest, SaysThatASigmaAtItsBoundMeansLittle) {
+  ASSERT_TRUE(next().value());
+  fits_say(0.03);
+  ASSERT_TRUE(next().value());
+  EXPECT_EQ(until_.knowledge().at("at_bound"), false);
+  alpha_ = 2;
+  fits_say(0.001);
+  EXPECT_FALSE(next().value());
+  EXPECT_THAT(until_.conclusion()->detail, HasSubstr("wanted is 0.02; it means little, since alpha lies at its bound"));
+  EXPECT_EQ(until_.knowledge().at("at_bound"), true);
 }
 
 TEST_F(UntilKnownTest, SaysWhyItCannotBeReached) {

@@ -8,7 +8,7 @@ import { who } from '../experiments/words';
 import { change_design, with_controller, with_plant } from './address';
 import type { DesignComparison, StoredDesign } from './design_api';
 import type { StepProps } from './parts';
-import { fixed_text, number_text, with_sigma } from './words';
+import { fixed_text, kAtBound, number_text, with_sigma } from './words';
 
 interface KeptProps extends StepProps {
   problem: string;
@@ -158,12 +158,13 @@ function Compared({ comparison }: { comparison: DesignComparison }) {
           </tr>
         </thead>
         <tbody>
-          {comparison.parameters.map(({ name, values, one_sigma, relative_to_first, sigmas_from_first }) => (
+          {comparison.parameters.map(({ name, values, one_sigma, at_bound, relative_to_first, sigmas_from_first }) => (
             <tr key={name}>
               <th scope="row">{name}</th>
               {values.map((value, at) => (
                 <td key={at} class="number">
                   {with_sigma(value, one_sigma[at] ?? null)}
+                  {at_bound[at] && <small> {kAtBound}</small>}
                 </td>
               ))}
               <td class="number">{number_text(relative_to_first[1], 4)}</td>

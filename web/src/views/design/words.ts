@@ -50,9 +50,11 @@ export const kSymbols: Record<Parameter, { symbol: string; unit: string; power: 
 const kWell = 0.02;
 const kRoughly = 0.1;
 
+export const kAtBound = 'at its bound, where its ± means little';
+
 // How well a parameter is known; '' where it was not fitted. The sigma of one at its bound means little.
 export function knowledge_text(value: number, sigma: number | null, is_at_bound = false): string {
-  if (is_at_bound) return 'at its bound, where its ± means little';
+  if (is_at_bound) return kAtBound;
   if (sigma === null || !(sigma > 0)) return 'fixed by the structure';
   const relative = sigma / Math.abs(value);
   const size = `${number_text(relative * 100, 2)} %`;

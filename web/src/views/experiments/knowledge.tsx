@@ -41,7 +41,10 @@ export function KnowledgePanel({ runs }: { runs: readonly ExperimentRun[] }) {
               <tr key={number}>
                 <th scope="row">{number}</th>
                 <td>{three_digits(value_of(knowledge))}</td>
-                <td>{three_digits(knowledge.sigma)}</td>
+                <td>
+                  {three_digits(knowledge.sigma)}
+                  {knowledge.at_bound && <small> at its bound, where it means little</small>}
+                </td>
                 <td>{three_digits(knowledge.promised_sigma)}</td>
               </tr>
             ))}
