@@ -28,8 +28,6 @@ double section_share(double time_constant_s) {
   return 12 * x / (12 + 6 * x + x * x);
 }
 
-double shape_correlation_s(bool is_confirmed) { return (is_confirmed ? kOfTheFluid : kAssumed).correlation_s; }
-
 EstimatorCovariance::EstimatorCovariance(const EstimateParameters& parameters)
     : parameters_{parameters},
       gain_m_s_{parameters.gain_m_s.data()},

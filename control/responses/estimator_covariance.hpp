@@ -35,9 +35,6 @@ struct EstimateParameters {
 // 1 - e^-(tick/τ), as the robot computes it.
 double section_share(double time_constant_s);
 
-// For so long an error of the model's shape keeps its sign.
-double shape_correlation_s(bool is_confirmed);
-
 class EstimatorCovariance {
  public:
   using Errors = Eigen::Matrix<double, kEstimateErrors, 1>;

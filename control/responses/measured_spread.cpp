@@ -14,8 +14,9 @@ using Eigen::Index;
 using Matrix = Eigen::MatrixXd;
 
 constexpr double kRest_s = 3;
-constexpr double kAge_s = 0.004;    // of a reading, sd about the middle of a tick, low pass included
-constexpr double kClockSd = 0.005;  // of the sensor's clock, relative: sensor/sensor_prior.hpp
+constexpr double kAge_s = 0.004;             // of a reading, sd about the middle of a tick, low pass included
+constexpr double kClockSd = 0.005;           // of the sensor's clock, relative: sensor/sensor_prior.hpp
+constexpr double kShapeCorrelation_s = 0.1;  // the robot's estimator reckons with more of an assumed model
 
 // Rows of s in (5); the controller's states follow.
 constexpr Index kVelocity = 1, kBias = 2, kGain = 3;
@@ -29,9 +30,7 @@ double kept(double correlation_s) { return std::exp(-kEstimateTick_s / correlati
 class Loop {
  public:
   explicit Loop(const LoopParts& parts)
-      : parts_{parts},
-        floor_kept_{kept(parts.estimate.correlation_s)},
-        shape_kept_{kept(shape_correlation_s(parts.estimate.is_confirmed))} {
+      : parts_{parts}, floor_kept_{kept(parts.estimate.correlation_s)}, shape_kept_{kept(kShapeCorrelation_s)} {
     for (std::size_t i = 0; i < kEstimateSections; ++i) share_[i] = section_share(parts.time_constant_s[i]);
   }
 

@@ -72,7 +72,11 @@ void print_first_seconds(int fluids, int seeds, unsigned draw) {
   int seconds_below = 0, fluids_below = 0;
   double within = 0, least = 1;
   for (const control::FractionalModel& fluid : control::fluid_family(fluids, draw)) {
-    robot_fw::EstimatorTrial trial{.truth = fluid, .estimator = {}, .closed_loop = true, .disturbance_m = -0.05};
+    robot_fw::EstimatorTrial trial;
+    trial.truth = fluid;
+    trial.estimator = {};
+    trial.closed_loop = true;
+    trial.disturbance_m = -0.05;
     std::vector<double> shares(kSeconds, 0.0);
     for (int seed = 1; seed <= seeds; ++seed) {
       const auto seconds = robot_fw::run_trial(trial, static_cast<std::uint64_t>(seed)).seconds_within;
