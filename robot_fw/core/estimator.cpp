@@ -15,8 +15,8 @@ constexpr float kGainWalk = 0.003F;           // sd of the gain's change in 1 s
 constexpr float kLostM = 10;                  // sd of the position after a restart
 constexpr float kLostM_S = 0.5F;              // of the velocity then; water's model reaches 0.35 m/s
 
-constexpr float kSlip =
-    0.15F;  // sd of the velocity that repeated and skipped readings cost, relative to a tick's change
+// sd of the velocity that repeated and skipped readings cost, relative to a tick's change.
+constexpr float kSlip = 0.15F;
 // Of the model's change in a tick without a reading: sd, relative, and in m/s².
 constexpr float kUnsensedShare = 0.3F;
 constexpr float kUnsensedM_S2 = 0.02F;

@@ -1,6 +1,6 @@
-// Prints how well the robot knows its position in fluids whose model it was told: fluid_study [FLUIDS] [SEEDS]; in how
-// many fluids four sections make a model: fluid_study models; or how well it knows it in each second where it was told
-// nothing: fluid_study first_seconds [FLUIDS] [SEEDS] [DRAW].
+// Prints how well the robot knows its position in fluids whose model it has: fluid_study [FLUIDS] [SEEDS]; in how
+// many fluids four sections make a model: fluid_study models; or how well it knows it in each second without a model
+// of the fluid: fluid_study first_seconds [FLUIDS] [SEEDS] [DRAW].
 //
 // Figure 7's loop on the estimate, default sensor, the model of control/discretisation/estimator_model, confirmed.
 // Fluids are drawn as in tests/control/fluid_family.hpp until so many have a model; those that have none are counted.
@@ -66,31 +66,21 @@ void print(const Tally& tally) {
       100.0 * tally.sds_to_7_mm / std::max(tally.trials, 1), 1e3 * tally.largest_error_m, 1e3 * tally.largest_sd_m);
 }
 
-// Without a model of the fluid: the fluids in which a second has less than 80 % of seeds within 2 sd.
+// Without a model of the fluid.
 void print_first_seconds(int fluids, int seeds, unsigned draw) {
-  constexpr std::size_t kSeconds = 42;
-  int seconds_below = 0, fluids_below = 0;
+  std::ptrdiff_t seconds_below = 0, fluids_below = 0;
   double within = 0, least = 1;
   for (const control::FractionalModel& fluid : control::fluid_family(fluids, draw)) {
-    robot_fw::EstimatorTrial trial;
-    trial.truth = fluid;
-    trial.estimator = {};
-    trial.closed_loop = true;
-    trial.disturbance_m = -0.05;
-    std::vector<double> shares(kSeconds, 0.0);
-    for (int seed = 1; seed <= seeds; ++seed) {
-      const auto seconds = robot_fw::run_trial(trial, static_cast<std::uint64_t>(seed)).seconds_within;
-      for (std::size_t at = 0; at < kSeconds; ++at) shares[at] += seconds[at] ? 1.0 / seeds : 0;
-    }
-    for (const double share : shares) within += share / static_cast<double>(kSeconds) / fluids;
+    const auto shares = robot_fw::shares_within(robot_fw::figure_7_in(fluid), seeds);
+    for (const double share : shares) within += share / static_cast<double>(shares.size()) / fluids;
     const auto below = std::ranges::count_if(shares, [](double share) { return share < 0.8 - 1e-9; });
-    seconds_below += static_cast<int>(below);
+    seconds_below += below;
     fluids_below += below > 0 ? 1 : 0;
     least = std::min(least, std::ranges::min(shares));
   }
   std::printf(
       "%d fluids, draw %u, %d seeds: %.2f %% of seconds within 2 sd; the least second %.0f %%; below 80 %%: "
-      "%d seconds in %d fluids\n",
+      "%td seconds in %td fluids\n",
       fluids, draw, seeds, 100 * within, 100 * least, seconds_below, fluids_below);
 }
 

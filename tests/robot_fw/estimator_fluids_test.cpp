@@ -155,30 +155,20 @@ TEST(EstimatorFluids, ThePositionIsWithinTwoStandardDeviationsWhenAllNumbersDiff
   }
 }
 
-// Of `seeds` trials of Figure 7, the share within 2 sd in each second.
-std::vector<double> shares_within(const control::FractionalModel& fluid, int seeds) {
-  std::vector<double> shares(kDurationS, 0.0);
-  for (int seed = 1; seed <= seeds; ++seed) {
-    const auto seconds = seconds_of({.model = fluid}, EstimatorParameters{}, {}, static_cast<std::uint64_t>(seed));
-    for (std::size_t second = 0; second < shares.size(); ++second)
-      shares[second] += seconds[second].is_within() ? 1.0 / seeds : 0;
-  }
-  return shares;
-}
-
 // In slow fluids and in those that swing, not only in the mean: the second after the first move is the worst one.
 TEST(EstimatorFluids, EachSecondOfFigure7IsWithinTwoStandardDeviationsInEachOf80Fluids) {
   const auto fluids = control::fluid_family(80, 20261129);
   for (std::size_t number = 0; number < fluids.size(); ++number) {
-    if (std::ranges::min(shares_within(fluids[number], 10)) >= 0.8 - 1e-9) continue;
-    const auto shares = shares_within(fluids[number], 100);
+    const EstimatorTrial trial = figure_7_in(fluids[number]);
+    if (std::ranges::min(shares_within(trial, 10)) >= 0.8 - 1e-9) continue;
+    const auto shares = shares_within(trial, 100);
     const auto least = std::ranges::min_element(shares);
     EXPECT_GE(*least, 0.85) << "fluid " << number << ", second " << least - shares.begin() + 1;
   }
 }
 
-// Of no linear fluid at all: the drag goes with the speed to the power of 0.6, and lags. The sd in the loop was 8.0 mm
-// with an error of 4.2 mm rms before an assumed model could lag; now most seeds have 2 mm.
+// A fluid that no linear model describes: its drag goes with the speed to the power of 0.6, and lags. The sd in the
+// loop was 8.0 mm, of an error of 4.2 mm rms, before an assumed model could lag; the error is 2 mm now.
 TEST(EstimatorFluids, ThePositionIsWithinTwoStandardDeviationsInAFluidThatThinsUnderShear) {
   const sim_robot::PlantParameters thinning = sim_robot::fluid("shear_thinning");
   for (const Drive& drive : {Drive{}, Drive{{0.1F, 0.1F}}, Drive{{0.3F, 0.3F}}, Drive{{0.8F, 0.8F}}}) {

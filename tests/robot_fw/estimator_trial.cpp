@@ -80,6 +80,25 @@ TrialResult run_trial(const EstimatorTrial& trial, std::uint64_t seed) {
   return result;
 }
 
+EstimatorTrial figure_7_in(const control::FractionalModel& fluid) {
+  EstimatorTrial trial;
+  trial.truth = fluid;
+  trial.estimator = {};
+  trial.closed_loop = true;
+  trial.disturbance_m = -0.05;
+  return trial;
+}
+
+std::vector<double> shares_within(const EstimatorTrial& trial, int seeds) {
+  std::vector<double> shares;
+  for (int seed = 1; seed <= seeds; ++seed) {
+    const auto within = run_trial(trial, static_cast<std::uint64_t>(seed)).seconds_within;
+    shares.resize(within.size());
+    for (std::size_t second = 0; second < within.size(); ++second) shares[second] += within[second] ? 1.0 / seeds : 0;
+  }
+  return shares;
+}
+
 StudyRow run_study(const EstimatorTrial& trial, int seeds) {
   StudyRow row;
   std::vector<double> errors_m, targets_m, sds_m;

@@ -41,6 +41,11 @@ struct TrialResult {
 
 TrialResult run_trial(const EstimatorTrial& trial, std::uint64_t seed);
 
+// The paper's Figure 7 on the estimate, by a robot without a model of its fluid.
+EstimatorTrial figure_7_in(const control::FractionalModel& fluid);
+// Each second's share of trials, of seeds 1 to `seeds`, within 2 sd.
+std::vector<double> shares_within(const EstimatorTrial& trial, int seeds);
+
 // The 95th percentile of the absolute values, root mean square, share of trials within 2 sd at the end, and so on.
 struct StudyRow {
   double error_95_m = 0, error_rms_m = 0, target_95_m = 0;
