@@ -32,11 +32,8 @@ constexpr float kRestingModelM_S = 0.0003F;  // below it the modelled velocity h
 constexpr float kStillM_S2 = 0.01F;          // below it nothing is felt but noise and bias
 constexpr float kDoubt = 0.6F;               // share of the doubtful way that is one sd
 
-constexpr float kPulseLeakPerS = 2;      // slower changes of velocity are no pulsation
-constexpr float kWindowS = 1;            // longer than a period of the pump
-constexpr float kLeastFlowM_S = 0.004F;  // rms; the noise gives less
 constexpr float kDriftPerFlow = 1.5F;    // sd of the mean flow, relative to the pulsation's rms
-constexpr float kUnseenFlowS = 4;        // for so long a flow may have been there when it is seen first
+constexpr float kLastingS = 4;           // for so long what is seen in each window may have been there
 constexpr float kDriftDecayPerS = 0.5F;  // once the flow is over
 
 constexpr float kSurprising = 9;           // innovation squared by its variance
@@ -128,7 +125,8 @@ void Estimator::start() {
   covariance_[velocity][velocity] = square(kStartVelocityM_S);
   covariance_[bias][bias] = square(parameters_.bias_m_s2);
   restart_gains();
-  velocity_m_s_ = bias_m_s2_ = drift_m_s_ = unexplained_m_s_ = 0;
+  velocity_m_s_ = bias_m_s2_ = drift_m_s_ = 0;
+  pulsation_.restart();
 }
 
 void Estimator::step(const EstimatorInputs& inputs) {
@@ -138,7 +136,7 @@ void Estimator::step(const EstimatorInputs& inputs) {
   integrate(inputs);
   if (++interval_.ticks < kTicksPerMeasurement) return;
   propagate_covariance();
-  if (flow_m_s_ > 0) {
+  if (flow_m_s() > 0) {
     admit_drift();
   } else {
     let_drift_die_down();
@@ -198,25 +196,15 @@ void Estimator::integrate(const EstimatorInputs& inputs) {
   position_m_ += dt_s * (velocity_m_s_ + 0.5F * change_m_s);
   velocity_m_s_ += change_m_s;
   interval_.duration_s += dt_s;
-  watch_flow(change_m_s - explained_m_s, dt_s);
+  const bool may_err = !parameters_.is_confirmed;
+  pulsation_.step(change_m_s - explained_m_s, explained_m_s, dt_s,
+                  {may_err ? parameters_.gain_error : 0, may_err ? kAssumed.lag_s : 0});
 }
 
 // Coasting, the robot feels the drag; at rest it feels the bias alone, which may not be known well yet.
 void Estimator::watch_stillness(float reading_m_s2, float dt_s) {
   felt_m_s2_ += std::min(dt_s, 1.0F) * (reading_m_s2 - felt_m_s2_);
   still_s_ = duty_ == 0 && std::fabs(felt_m_s2_) < kStillM_S2 ? still_s_ + dt_s : 0;
-}
-
-// A flow is what goes on pulsating through three windows; a move ends sooner, or its gain is found.
-void Estimator::watch_flow(float unexplained_m_s, float dt_s) {
-  unexplained_m_s_ += unexplained_m_s - unexplained_m_s_ * dt_s * kPulseLeakPerS;
-  window_sum_ += square(unexplained_m_s_) * dt_s;
-  window_s_ += dt_s;
-  if (window_s_ < kWindowS) return;
-  window_mean_square_ = {window_mean_square_[1], window_mean_square_[2], window_sum_ / window_s_};
-  window_s_ = window_sum_ = 0;
-  const float least = *std::min_element(window_mean_square_.begin(), window_mean_square_.end());
-  flow_m_s_ = least > square(kLeastFlowM_S) ? std::sqrt(least) : 0;
 }
 
 // P → F P Fᵀ + Q, F - 1 having but the rows of position and velocity.
@@ -266,11 +254,11 @@ void Estimator::admit_drift() {
   float since_s = 0;
   if (!drift_admitted_) {
     drift_admitted_ = true;
-    since_s = kUnseenFlowS;
+    since_s = kLastingS;
     surprises_ = 0;
     restart_gains();  // what the gains have learned was the flow
   }
-  const float missing = square(kDriftPerFlow * flow_m_s_) - p[drift][drift];
+  const float missing = square(kDriftPerFlow * flow_m_s()) - p[drift][drift];
   if (missing <= 0) return;
   const Vector along{since_s, 1, 0, 1};
   for (std::size_t i = 0; i < kStates; ++i) {
@@ -280,11 +268,14 @@ void Estimator::admit_drift() {
 
 // Of ε in (3), as white noise.
 float Estimator::measurement_variance(bool is_confirmed) const {
-  const ModelDoubt& doubt = is_confirmed || at_rest() ? kOfTheFluid : kAssumed;
+  const bool is_assumed = !is_confirmed && !at_rest();
+  const ModelDoubt& doubt = is_assumed ? kAssumed : kOfTheFluid;
   const float floor_m_s = at_rest() ? parameters_.resting_velocity_m_s : parameters_.driven_velocity_m_s;
   const float shape =
       square(parameters_.shape_error * model_m_s_) + square(doubt.lag_s * interval_.fastest_change_m_s2);
-  const float area = parameters_.correlation_s * (square(floor_m_s) + square(flow_m_s_)) + doubt.correlation_s * shape;
+  const float misfit = is_assumed ? pulsation_.misfit() : 0;
+  const float area = parameters_.correlation_s * (square(floor_m_s) + square(flow_m_s())) +
+                     doubt.correlation_s * shape + kLastingS * misfit * square(model_m_s_);
   return 2 * area / interval_.duration_s;
 }
 
@@ -304,7 +295,7 @@ bool Estimator::compare_with_model() {
   const float surprise = surprise_ = square(innovation) / (variance + measurement_variance(true));
   variance += measurement_variance(parameters_.is_confirmed);
   const bool moving = std::fabs(model_m_s_) > kRestingModelM_S;
-  if (surprise > kSurprising && moving && flow_m_s_ == 0 && gain_variance() < 1) {  // the gain is quite another
+  if (surprise > kSurprising && moving && flow_m_s() == 0 && gain_variance() < 1) {  // the gain is quite another
     float nominal_m_s = 0;
     for (std::size_t k = 0; k < kModelSections; ++k) nominal_m_s += parameters_.model.gain_m_s[k] * section_[k];
     const float reopened = std::min(square(innovation / nominal_m_s), 4.0F);
@@ -371,8 +362,9 @@ void Estimator::add_to(Crc32& crc) const {
   for (const Vector& row : covariance_) {
     for (const float value : row) crc.add_float(value);
   }
-  for (const float value : {position_m_, velocity_m_s_, bias_m_s2_, drift_m_s_, position_sd_m_, flow_m_s_, model_m_s_,
-                            doubtful_m_, unexplained_m_s_, surprises_}) {
+  for (const float value :
+       {position_m_, velocity_m_s_, bias_m_s2_, drift_m_s_, position_sd_m_, flow_m_s(), model_m_s_, doubtful_m_,
+        pulsation_.unexplained_m_s(), pulsation_.explained_m_s(), pulsation_.misfit(), surprises_}) {
     crc.add_float(value);
   }
 }

@@ -1,6 +1,7 @@
 // Prints how well the robot knows its position in fluids whose model it has: fluid_study [FLUIDS] [SEEDS]; in how
-// many fluids four sections make a model: fluid_study models; or how well it knows it in each second without a model
-// of the fluid: fluid_study first_seconds [FLUIDS] [SEEDS] [DRAW].
+// many fluids four sections make a model: fluid_study models; or how well it knows it without a model of the fluid, in
+// each second of Figure 7's loop: fluid_study first_seconds [FLUIDS] [SEEDS] [DRAW]; and under duties by hand that are
+// faster than the fluid: fluid_study by_hand [FLUIDS] [SEEDS] [DRAW].
 //
 // Figure 7's loop on the estimate, default sensor, the model of control/discretisation/estimator_model, confirmed.
 // Fluids are drawn as in tests/control/fluid_family.hpp until so many have a model; those that have none are counted.
@@ -9,6 +10,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <functional>
 #include <vector>
 
 #include "control/discretisation/estimator_model.hpp"
@@ -84,6 +86,57 @@ void print_first_seconds(int fluids, int seeds, unsigned draw) {
       fluids, draw, seeds, 100 * within, 100 * least, seconds_below, fluids_below);
 }
 
+// Of all seconds of some fluids' trials, and the worst of these fluids.
+void print_by_hand(const char* name, const std::vector<control::FractionalModel>& fluids, int seeds,
+                   const std::function<robot_fw::DutyByHand(std::uint64_t)>& duty) {
+  double squares_m2 = 0, worst_rms_m = 0, least = 1, flow_s = 0, duration_s = 0;
+  std::ptrdiff_t within = 0;
+  std::vector<double> sds_m;
+  for (const control::FractionalModel& fluid : fluids) {
+    double fluids_squares_m2 = 0;
+    std::ptrdiff_t fluids_within = 0, seconds = 0;
+    for (int seed = 1; seed <= seeds; ++seed) {
+      auto trial = robot_fw::figure_7_in(fluid);
+      trial.by_hand = duty(static_cast<std::uint64_t>(seed));
+      const auto result = robot_fw::run_trial(trial, static_cast<std::uint64_t>(seed));
+      for (std::size_t i = 0; i < result.errors_m.size(); ++i, ++seconds) {
+        fluids_squares_m2 += result.errors_m[i] * result.errors_m[i];
+        fluids_within += std::abs(result.errors_m[i]) <= 2 * result.sds_m[i] ? 1 : 0;
+        sds_m.push_back(result.sds_m[i]);
+      }
+      flow_s += result.flow_s;
+      duration_s += trial.duration_s;
+    }
+    worst_rms_m = std::max(worst_rms_m, std::sqrt(fluids_squares_m2 / static_cast<double>(seconds)));
+    least = std::min(least, static_cast<double>(fluids_within) / static_cast<double>(seconds));
+    squares_m2 += fluids_squares_m2;
+    within += fluids_within;
+  }
+  const auto count = static_cast<double>(sds_m.size());
+  std::ranges::nth_element(sds_m, sds_m.begin() + std::ssize(sds_m) / 2);
+  std::printf("| %s | %.1f %%, least of a fluid %.1f %% | %.0f, most of a fluid %.0f | %.0f | %.1f %% |\n", name,
+              100 * static_cast<double>(within) / count, 100 * least, 1e3 * std::sqrt(squares_m2 / count),
+              1e3 * worst_rms_m, 1e3 * sds_m[sds_m.size() / 2], 100 * flow_s / duration_s);
+}
+
+void print_by_hand(int fluids, int seeds, unsigned draw) {
+  const auto family = control::fluid_family(fluids, draw);
+  const auto in_turn = [](std::uint64_t) -> robot_fw::DutyByHand {
+    return [](long tick) { return tick > 3000 ? 0 : tick / 30 % 2 == 0 ? 0.1F : 0.7F; };
+  };
+  const auto at_random = [](std::uint64_t seed) { return robot_fw::duties_at_random(-1, 1, seed); };
+  const auto forwards = [](std::uint64_t seed) { return robot_fw::duties_at_random(0, 1, seed); };
+  std::printf(
+      "| %d fluids, draw %u, %d seeds | within 2 sd | rms error mm | median sd mm | of the time a flow is suspected "
+      "|\n|---|---|---|---|---|\n",
+      fluids, draw, seeds);
+  print_by_hand("at random in [-1, 1], each for 0.03 to 1 s", family, seeds, at_random);
+  print_by_hand("at random in [0, 1], each for 0.03 to 1 s", family, seeds, forwards);
+  print_by_hand("0.1 and 0.7 in turn, each for 0.3 s", family, seeds, in_turn);
+  print_by_hand("(29) itself, at random in [-1, 1]", {control::kNonNewtonianModel}, 10 * seeds, at_random);
+  print_by_hand("water, 0.1 and 0.7 in turn", {control::kNewtonianModel}, 10 * seeds, in_turn);
+}
+
 double overshoot(const control::FractionalModel& fluid) {
   std::vector<double> time_s;
   for (double time = 0.01; time < 60; time *= 1.02) time_s.push_back(time);
@@ -117,12 +170,16 @@ int main(int argc, char** argv) {
     print_models("ends and middles", control::fluid_family_corners());
     return 0;
   }
+  const auto number = [argc, argv](int at, int otherwise) { return argc > at ? std::atoi(argv[at]) : otherwise; };
   if (argc > 1 && std::strcmp(argv[1], "first_seconds") == 0) {
-    const auto number = [argc, argv](int at, int otherwise) { return argc > at ? std::atoi(argv[at]) : otherwise; };
     print_first_seconds(number(2, 80), number(3, 10), static_cast<unsigned>(number(4, 20261129)));
     return 0;
   }
-  const int fluids = argc > 1 ? std::atoi(argv[1]) : 20, seeds = argc > 2 ? std::atoi(argv[2]) : 10;
+  if (argc > 1 && std::strcmp(argv[1], "by_hand") == 0) {
+    print_by_hand(number(2, 80), number(3, 5), static_cast<unsigned>(number(4, 20261129)));
+    return 0;
+  }
+  const int fluids = number(1, 20), seeds = number(2, 10);
   if (fluids < 1 || seeds < 1) return std::fprintf(stderr, "fluid_study: give positive numbers\n"), 2;
   Tally all;
   int drawn = 0;

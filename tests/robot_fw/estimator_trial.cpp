@@ -5,6 +5,7 @@
 #include <cmath>
 #include <initializer_list>
 #include <numbers>
+#include <random>
 
 #include "robot_fw/core/controller.hpp"
 #include "sim_robot/world/world.hpp"
@@ -66,18 +67,31 @@ TrialResult run_trial(const EstimatorTrial& trial, std::uint64_t seed) {
         second_part ? trial.second_setpoint_m - trial.disturbance_m : trial.setpoint_m;  // of the true position
     const double seen_m = trial.closed_loop ? static_cast<double>(estimator.position_m()) : world.position_m();
     const float wanted = controller.step(static_cast<float>(target_m - seen_m), static_cast<float>(seen_m)).asked;
-    duty = std::clamp(wanted, trial.duty.min, trial.duty.max);
+    duty = trial.by_hand ? trial.by_hand(tick) : std::clamp(wanted, trial.duty.min, trial.duty.max);
 
     result.estimate_error_m = static_cast<double>(estimator.position_m()) - world.position_m();
     result.target_error_m = world.position_m() - target_m;
     result.position_sd_m = static_cast<double>(estimator.position_sd_m());
     if (result.mismatch_s < 0 && estimator.model_mismatch()) result.mismatch_s = time_s;
+    if (estimator.flow_m_s() > 0) result.flow_s += kTickS;
+    if (tick % 100 != 0) continue;
+    result.errors_m.push_back(result.estimate_error_m);
+    result.sds_m.push_back(result.position_sd_m);
     const bool within = std::abs(result.estimate_error_m) <= 2 * result.position_sd_m;
-    if (tick % 100 == 0) result.seconds_within.push_back(within);
+    result.share_within += (within ? 1 : 0) / std::floor(trial.duration_s);
   }
-  result.share_within =
-      static_cast<double>(std::ranges::count(result.seconds_within, true)) / std::floor(trial.duration_s);
   return result;
+}
+
+DutyByHand duties_at_random(float least, float most, std::uint64_t seed) {
+  constexpr long kTicks = 3000;
+  std::mt19937_64 random{seed};
+  std::vector<float> duties;
+  while (std::ssize(duties) < kTicks) {
+    const auto ticks = std::uniform_int_distribution<std::size_t>{3, 100}(random);
+    duties.insert(duties.end(), ticks, std::uniform_real_distribution{least, most}(random));
+  }
+  return [duties](long tick) { return tick <= kTicks ? duties[static_cast<std::size_t>(tick - 1)] : 0; };
 }
 
 EstimatorTrial figure_7_in(const control::FractionalModel& fluid) {
@@ -92,9 +106,12 @@ EstimatorTrial figure_7_in(const control::FractionalModel& fluid) {
 std::vector<double> shares_within(const EstimatorTrial& trial, int seeds) {
   std::vector<double> shares;
   for (int seed = 1; seed <= seeds; ++seed) {
-    const auto within = run_trial(trial, static_cast<std::uint64_t>(seed)).seconds_within;
-    shares.resize(within.size());
-    for (std::size_t second = 0; second < within.size(); ++second) shares[second] += within[second] ? 1.0 / seeds : 0;
+    const TrialResult result = run_trial(trial, static_cast<std::uint64_t>(seed));
+    shares.resize(result.errors_m.size());
+    for (std::size_t second = 0; second < shares.size(); ++second) {
+      const bool within = std::abs(result.errors_m[second]) <= 2 * result.sds_m[second];
+      shares[second] += (within ? 1.0 : 0.0) / seeds;
+    }
   }
   return shares;
 }
