@@ -38,7 +38,7 @@ class SinkNotifier {
   // An event of the station itself about a robot. Its kind has a row in docs/database.md: tests/check_docs.py compares
   // the table with the literals of the calls.
   void note(const RobotState& robot, std::string kind, std::string detail, std::string cause = "none");
-  // The same of a stretch of time that is over.
+  // The same of a stretch of time that is over, or has just begun: of no length.
   void note_part(const RobotState& robot, std::string kind, std::string detail, std::string cause,
                  const BootPart& part);
 

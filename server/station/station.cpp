@@ -179,6 +179,13 @@ void Station::note_interruption(const RobotId& id, const BootPart& part, const s
   if (entry != nullptr) parts_->notifier.note_part(entry->robot, "experiment_interrupted", detail, reason, part);
 }
 
+void Station::note_pause(const RobotId& id, BootId boot_id, std::uint64_t from_robot_us, const std::string& reason,
+                         const std::string& detail) {
+  const RobotEntry* entry = parts_->robots.find(id);
+  const BootPart begun{boot_id, from_robot_us, 0};
+  if (entry != nullptr) parts_->notifier.note_part(entry->robot, "experiment_paused", detail, reason, begun);
+}
+
 void Station::set_retired(const RobotId& id, std::int64_t retired_at_us, const std::string& actor) {
   RobotEntry* entry = parts_->robots.find(id);
   if (entry == nullptr || entry->robot.retired_at_us == retired_at_us) return;

@@ -172,6 +172,9 @@ class Station {
   void note_model(const RobotId& id, const char* kind, const std::string& detail);
   // An event: an experiment was interrupted or paused, for so long from this time of a boot on.
   void note_interruption(const RobotId& id, const BootPart& part, const std::string& reason, const std::string& detail);
+  // The event of its beginning, which is left of it when the station is killed.
+  void note_pause(const RobotId& id, BootId boot_id, std::uint64_t from_robot_us, const std::string& reason,
+                  const std::string& detail);
 
   // An administrator has retired the robot, or put it back into use (0); the database has it, or is about to.
   void set_retired(const RobotId& id, std::int64_t retired_at_us, const std::string& actor);

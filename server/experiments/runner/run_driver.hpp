@@ -133,11 +133,15 @@ class RunDriver {
     bool goes_back = false;          // to make room: what is late meanwhile is a pause of its own
   };
 
-  // Of an interruption that is over, by whatever way.
+  // Of an interruption that begins, and of its end, by whatever way.
   struct InterruptionNote {
+    InterruptionNote(RunDriver& of, Abort why);
+    ~InterruptionNote();
+    InterruptionNote(const InterruptionNote&) = delete;
+    InterruptionNote& operator=(const InterruptionNote&) = delete;
+
     RunDriver& driver;
     Abort cause;
-    ~InterruptionNote();
   };
 
   // Where the line was broken off.

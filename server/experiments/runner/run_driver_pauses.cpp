@@ -122,6 +122,15 @@ asio::awaitable<void> RunDriver::go_back() {
   pause_->since_us = parts_.clock.steady_us();  // by now its client may be away for a while again
 }
 
+// The run goes on without a mark, but not its robot without a watch.
+RunDriver::InterruptionNote::InterruptionNote(RunDriver& of, Abort why) : driver{of}, cause{std::move(why)} {
+  try {
+    of.parts_.station.note_pause(of.request_.robot_id, of.boot_id_, of.paused_robot_us_, cause.reason, cause.detail);
+  } catch (const std::exception& error) {
+    spdlog::error("the beginning of an interruption of a run is not noted: {}", runtime::text_of(error));
+  }
+}
+
 RunDriver::InterruptionNote::~InterruptionNote() {
   driver.broken_off_.reset();
   try {
@@ -132,14 +141,13 @@ RunDriver::InterruptionNote::~InterruptionNote() {
   driver.pause_.reset();
 }
 
-// It lasts until the line goes on.
+// It lasts until the line goes on; one of no length, too, ends what was noted of its beginning.
 void RunDriver::note_interruption(std::uint64_t from_robot_us, Abort cause) const {
   const station::RobotState& robot = *parts_.station.find(request_.robot_id);
   const bool is_of_now = robot.boot_id == boot_id_;  // else the robot has booted again, and its clock is another one
   const std::uint64_t now_us = is_of_now ? robot_now_us(robot) : seen_robot_us_;
   const std::uint64_t to_robot_us = abort_ ? now_us : std::max(now_us, feed_.begins_at_robot_us());
-  if (to_robot_us <= from_robot_us) return;
-  const double length_s = static_cast<double>(to_robot_us - from_robot_us) / 1e6;
+  const double length_s = static_cast<double>(std::max(to_robot_us, from_robot_us) - from_robot_us) / 1e6;
   if (pause_ && pause_->why.reason == cause.reason) cause = pause_->why;  // in the words of the end
   parts_.station.note_interruption(request_.robot_id, {boot_id_, from_robot_us, length_s}, cause.reason, cause.detail);
 }

@@ -37,9 +37,14 @@ constexpr const char* kInsertEventGap =
 constexpr const char* kInsertEvent =
     "INSERT INTO event (robot_id, boot_key, event_seq, robot_time_us, sample_seq, kind, cause, mode, sub_state,"
     " position_m, value, emergency_id, command_id, received_at_us, emergency_cause, detail,"
-    " unknown_values) VALUES (?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?)";
+    " unknown_values) VALUES (?1,coalesce(?2,(SELECT boot_key FROM boot WHERE boot_id = ?18)),?3,?4,?5,?6,?7,?8,?9,"
+    "?10,?11,?12,?13,?14,?15,?16,?17)";
 
 }  // namespace
+
+bool is_of_interruption(const station::RobotEvent& event) {
+  return event.kind == "experiment_paused" || event.kind == "experiment_interrupted";
+}
 
 bool WriteBatch::empty() const {
   return new_boots.empty() && segments.empty() && gaps.empty() && events.empty() && event_gaps.empty() &&
@@ -130,12 +135,13 @@ std::int64_t SampleStore::write_segment(const Segment& segment, std::int64_t fir
 void SampleStore::write_event(const StoredEvent& stored) {
   const station::RobotEvent& event = stored.event;
   const auto boot_key = stored.boot_key == 0 ? std::nullopt : std::optional{stored.boot_key};
+  const auto of_boot = is_of_interruption(event) ? std::optional{event.boot_id} : std::nullopt;
   const auto emergency_cause = event.emergency_cause.transform(
       [](protocol::EmergencyCause cause) { return std::string{protocol::text(cause)}; });
   execute(insert_event_, event.robot_id, boot_key, event.event_seq, event.robot_time_us, event.sample_seq, event.kind,
           event.cause, protocol::text(event.mode), protocol::text(event.sub_state), event.position_m, event.value,
           event.emergency_id, event.command_id, event.received_at_us, emergency_cause, event.detail,
-          event.unknown_values);
+          event.unknown_values, of_boot);
 }
 
 }  // namespace server::storage

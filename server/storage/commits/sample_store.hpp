@@ -21,8 +21,11 @@
 
 namespace server::storage {
 
+// Where the experiment of a run waited.
+bool is_of_interruption(const station::RobotEvent& event);
+
 struct StoredEvent {
-  std::int64_t boot_key = 0;  // 0: an event of the station
+  std::int64_t boot_key = 0;  // 0: an event of the station; of an interruption the database looks for its boot
   station::RobotEvent event;
 };
 

@@ -77,7 +77,8 @@ constexpr Copy kCopies[] = {
      " AND sample_seq >= first_seq AND sample_seq <= coalesce(last_seq, 9223372036854775807))"
      " OR (event_seq IS NULL AND received_at_us >= started_at_us"
      " AND received_at_us <= coalesce(ended_at_us, 9223372036854775807))"
-     " OR (kind = 'experiment_interrupted' AND EXISTS (SELECT 1 FROM span WHERE span.boot_id = robot_event.boot_id)))",
+     " OR (kind IN ('experiment_interrupted', 'experiment_paused') AND EXISTS (SELECT 1 FROM span WHERE span.boot_id = "
+     "robot_event.boot_id)))",
      "SELECT max(event_row) FROM (SELECT event_row FROM store.event WHERE robot_id = (SELECT robot_id FROM run)"
      " AND event_row > {1} ORDER BY event_row LIMIT 1000)"},
     {"CREATE TABLE command AS SELECT * FROM store.robot_command LIMIT 0"},

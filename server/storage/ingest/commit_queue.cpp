@@ -48,6 +48,7 @@ void CommitQueue::enqueue_start(BootEntry& boot, BootStart start) {
 void CommitQueue::build_commit(BootsWithRecords& with_records) {
   commit_ = std::exchange(queued_, {});
   queued_commands_.clear();
+  interruptions_ = 0;
   move_gaps(with_records);
   move_segments();
   move_starts();

@@ -22,6 +22,10 @@
 
 namespace server::storage {
 
+// Parts of runs in which experiments waited, that are queued beyond the limit of records: some for each robot while the
+// disk fails.
+inline constexpr std::size_t kMostInterruptions = 1000;
+
 // So many segments have been enqueued, or have left the queue, ever.
 using QueuePosition = std::uint64_t;
 
@@ -47,6 +51,11 @@ class CommitQueue {
   bool has_room_for_record() const { return records() < max_records_; }
   bool is_half_empty_of_records() const { return records() <= max_records_ / 2; }
   void enqueue(StoredEvent event) { queued_.events.push_back(std::move(event)); }
+  bool has_room_for_interruption() const { return has_room_for_record() || interruptions_ < kMostInterruptions; }
+  void enqueue_interruption(StoredEvent event) {
+    ++interruptions_;
+    enqueue(std::move(event));
+  }
   void enqueue(station::AuditNote note) { queued_.audit.push_back(std::move(note)); }
   void enqueue(StoredClock clock) { queued_.clocks.push_back(clock); }
   void enqueue(StoredInForce in_force) { queued_.in_force.push_back(std::move(in_force)); }
@@ -120,6 +129,7 @@ class CommitQueue {
 
   WriteBatch queued_;                                                    // records; the rest waits in the next two
   std::unordered_map<station::CommandId, std::size_t> queued_commands_;  // where each waits in queued_.commands
+  std::size_t interruptions_ = 0;                                        // in queued_.events
   std::deque<QueuedSegment> segments_;
   std::size_t segment_samples_ = 0;  // of segments_
   std::deque<QueuedStart> starts_;

@@ -12,7 +12,8 @@
 // Overflow: when the queue is full a batch is neither queued nor acknowledged; the robot still holds it, and it is
 // asked for again (set_on_missing's function) once the queue has drained. Missing samples are asked for the same way.
 // So are events. Commands beyond the limit, and what the station itself reports, are counted and not
-// recorded, but an emergency stop always is.
+// recorded, but an emergency stop always is, and where an experiment waited: a full queue has room for
+// kMostInterruptions of these.
 //
 // A disk that fails (full, locked by another program) never ends the station: what could not be written is kept, not
 // acknowledged, and tried again every second; everything behind it waits in the queue. Robots that are enrolled are
@@ -227,6 +228,7 @@ class Recorder final : public station::StationSink, public station::RobotArchive
   void watch(BootEntry& boot);
   void note_refused(std::size_t samples);
   bool room_for_record();
+  void record_interruption(const station::RobotEvent& event);
   void enqueue(const Renewals::Records& commands);
   std::int64_t key_of(station::BootId boot_id) const;
   void record_left_out(bool at_once);

@@ -91,6 +91,7 @@ void Recorder::on_fluid(const station::RobotState& robot) {
 
 void Recorder::on_event(const station::RobotState&, const station::RobotEvent& event) {
   BootEntry* boot = boots_->find_recorded(event.boot_id);
+  if (!event.event_seq && is_of_interruption(event)) return record_interruption(event);
   if (!event.event_seq) {
     if (!room_for_record()) return;
     queue_->enqueue(StoredEvent{boot == nullptr ? 0 : boot->recording.key(), event});
@@ -104,6 +105,15 @@ void Recorder::on_event(const station::RobotState&, const station::RobotEvent& e
   }
   boot->recording.set_events_lost_below(event.oldest_event_seq, "ring_overrun", event.received_at_us);
   watch(*boot);
+}
+
+// Of a boot that has been replaced, too: that is how such a wait may end. Nobody sends it again, and without it a fit
+// takes the wait for motion.
+void Recorder::record_interruption(const station::RobotEvent& event) {
+  const BootEntry* boot = boots_->find_loaded(event.boot_id);
+  if (!queue_->has_room_for_interruption() && !room_for_record()) return;
+  queue_->enqueue_interruption(StoredEvent{boot == nullptr ? 0 : boot->recording.key(), event});
+  wake();
 }
 
 void Recorder::on_command(const station::CommandRecord& command) {

@@ -47,41 +47,106 @@ Run run_from(SQLite::Statement& row) {
   return run;
 }
 
-// The parts of runs in which their experiments were interrupted.
+constexpr std::uint64_t kNoEnd = std::numeric_limits<std::int64_t>::max();
+
+constexpr const char* kAnyInterruption =
+    "SELECT 1 FROM event WHERE boot_key = ? AND kind = 'experiment_interrupted' LIMIT 1";
+constexpr const char* kInterruptionsOver =
+    "SELECT event_row, robot_time_us, value, cause, detail FROM event WHERE boot_key = ?1"
+    " AND kind = 'experiment_interrupted' AND robot_time_us < ?3 AND robot_time_us + value * 1e6 >= ?2"
+    " ORDER BY robot_time_us";
+// Of a run whose station may have been killed. No index has them, so that they are looked for by their time: within a
+// minute, since a run that is cut off ends with its last sample.
+constexpr const char* kInterruptionsBegun =
+    "SELECT event_row, robot_time_us, value, cause, detail FROM run JOIN event USING (robot_id)"
+    " WHERE run_id = ?1 AND (state IN ('open', 'interrupted') OR made_afterwards)"
+    " AND received_at_us >= started_at_us - 60000000"
+    " AND received_at_us <= coalesce(ended_at_us + 60000000, 9223372036854775807)"
+    " AND boot_key = ?2 AND kind = 'experiment_paused' ORDER BY event_row";
+constexpr const char* kNewestSegment =
+    "SELECT last_seq FROM segment WHERE boot_key = ? ORDER BY first_seq DESC LIMIT 1";
+
+// The parts of a run in which its experiment was interrupted: from an event `experiment_paused` to the
+// `experiment_interrupted` that follows. A station that was killed has left the first of them alone: such a part lasts
+// until the next one begins, or until the span ends; of a span that is open, until its newest stored sample.
 class Interruptions {
  public:
-  explicit Interruptions(SQLite::Database& database) : database_{database} {}
+  explicit Interruptions(SQLite::Database& database)
+      : any_{database, kAnyInterruption},
+        over_{database, kInterruptionsOver},
+        begun_{database, kInterruptionsBegun},
+        newest_{database, kNewestSegment},
+        times_{database} {}
 
   // Those of the run's last span, as far as they lie in it: an experiment may have made more than is of this run.
   void add_to(Run& run, std::int64_t boot_key) {
+    bind_all(begun_, run.id, boot_key);
+    std::vector<Mark> begun = read(begun_);
     bind_all(any_, boot_key);
-    if (!any_.executeStep()) return;
+    if (!any_.executeStep() && begun.empty()) return;
     times_.enter(boot_key);
     const RunSpan& span = run.spans.back();
     const auto first = times_.of(span.first_seq);
     const auto next = span.last_seq ? times_.of(*span.last_seq + 1) : std::nullopt;
     const std::uint64_t begins_us = first ? first->robot_time_us : 0;
-    const std::uint64_t ends_us = next ? next->robot_time_us : std::numeric_limits<std::int64_t>::max();
-    bind_all(parts_, boot_key, begins_us, ends_us);
-    while (parts_.executeStep()) {
-      const std::uint64_t from_us = unsigned_id(parts_.getColumn(0));
-      const auto length_us = static_cast<std::uint64_t>(std::llround(1e6 * parts_.getColumn(1).getDouble()));
-      InterruptedPart part{static_cast<std::uint32_t>(run.spans.size() - 1), std::max(from_us, begins_us),
-                           std::min(from_us + length_us, ends_us), parts_.getColumn(2).getString(),
-                           parts_.getColumn(3).getString()};
+    const std::uint64_t ends_us = next ? next->robot_time_us : kNoEnd;
+    bind_all(over_, boot_key, begins_us, ends_us);
+    std::vector<Mark> marks = read(over_);
+    std::erase_if(begun, [&](const Mark& mark) { return mark.from_us < begins_us || mark.from_us >= ends_us; });
+    keep_without_end(begun, marks);
+    for (Mark& mark : begun) {
+      if (mark.to_us == kNoEnd) mark.to_us = next ? ends_us : stored_until_us(boot_key);
+      marks.push_back(std::move(mark));
+    }
+    std::ranges::stable_sort(marks, {}, &Mark::from_us);
+    for (Mark& mark : marks) {
+      InterruptedPart part{static_cast<std::uint32_t>(run.spans.size() - 1), std::max(mark.from_us, begins_us),
+                           std::min(mark.to_us, ends_us), std::move(mark.reason), std::move(mark.detail)};
       if (part.from_robot_us < part.to_robot_us) run.interrupted.push_back(std::move(part));
     }
   }
 
  private:
-  SQLite::Database& database_;
-  SQLite::Statement any_{database_,
-                         "SELECT 1 FROM event WHERE boot_key = ? AND kind = 'experiment_interrupted' LIMIT 1"};
-  SQLite::Statement parts_{database_,
-                           "SELECT robot_time_us, value, cause, detail FROM event WHERE boot_key = ?1"
-                           " AND kind = 'experiment_interrupted' AND robot_time_us < ?3"
-                           " AND robot_time_us + value * 1e6 > ?2 ORDER BY robot_time_us"};
-  BootTimes times_{database_};
+  struct Mark {
+    std::int64_t row = 0;
+    std::uint64_t from_us = 0, to_us = 0;
+    std::string reason, detail;
+  };
+
+  static std::vector<Mark> read(SQLite::Statement& query) {
+    std::vector<Mark> marks;
+    while (query.executeStep()) {
+      const std::uint64_t from_us = unsigned_id(query.getColumn(1));
+      const auto length_us = static_cast<std::uint64_t>(std::llround(1e6 * query.getColumn(2).getDouble()));
+      marks.push_back({query.getColumn(0).getInt64(), from_us, from_us + length_us, query.getColumn(3).getString(),
+                       query.getColumn(4).getString()});
+    }
+    return marks;
+  }
+
+  // The end of a wait is stored before the beginning of the next; a wait without one lasts until then.
+  static void keep_without_end(std::vector<Mark>& begun, const std::vector<Mark>& over) {
+    std::vector<Mark> kept;
+    for (std::size_t k = 0; k < begun.size(); ++k) {
+      const Mark* next = k + 1 < begun.size() ? &begun[k + 1] : nullptr;
+      const auto ends_it = [&](const Mark& mark) {
+        return mark.row > begun[k].row && (next == nullptr || mark.row < next->row);
+      };
+      if (std::ranges::any_of(over, ends_it)) continue;
+      kept.push_back(begun[k]);
+      kept.back().to_us = next == nullptr ? kNoEnd : next->from_us;
+    }
+    begun = std::move(kept);
+  }
+
+  std::uint64_t stored_until_us(std::int64_t boot_key) {
+    bind_all(newest_, boot_key);
+    const auto next = newest_.executeStep() ? times_.of(unsigned_id(newest_.getColumn(0)) + 1) : std::nullopt;
+    return next ? next->robot_time_us : 0;
+  }
+
+  SQLite::Statement any_, over_, begun_, newest_;
+  BootTimes times_;
 };
 
 // Without the profile, which may be long, where its hash is stored.
@@ -210,6 +275,7 @@ std::optional<PerformedProfile> read_performed_profile(SQLite::Database& databas
 
 std::vector<InterruptedPart> read_interrupted_parts(SQLite::Database& database, RunId id) {
   Run run;
+  run.id = id;
   if (database.execAndGet("PRAGMA user_version").getInt64() < kInterruptionsSince) return {};
   Interruptions interruptions{database};
   SQLite::Statement spans{database,

@@ -1,4 +1,5 @@
 // What the recorder refuses, and what it does while the disk fails, is locked, or its queue is full.
+#include "server/storage/ingest/commit_queue.hpp"
 #include "tests/server/recording/recorder_fixture.hpp"
 
 namespace server {
@@ -110,6 +111,37 @@ TEST_F(RecorderFaultsTest, AFullQueueStillTakesEveryStopAndTheNewestStateOfAComm
   send_command(4, "emergency_stop", station::CommandState::acknowledged);
   flush();
   EXPECT_EQ(rows("SELECT state FROM command WHERE command_id = 4"), Rows{"acknowledged"});
+}
+
+// Nobody sends them again; the queue has room of its own for them, which ends, too.
+TEST_F(RecorderFaultsTest, AFullQueueStillTakesWhereAnExperimentWaited) {
+  storage::RecorderOptions options;
+  options.max_queued_records = 2;
+  start(options);
+  connect(robot_);
+  flush();
+  const auto note = [this](const char* kind) {
+    station::RobotEvent made;
+    made.robot_id = robot_.id;
+    made.boot_id = robot_.boot_id;
+    made.kind = kind;
+    recorder_->on_event(state_of(robot_, station::LinkState::connected), made);
+  };
+  for (int k = 0; k < 3; ++k) note("fluid_set");
+  EXPECT_EQ(recorder_->counters().records_refused, 1U);
+  note("experiment_paused");
+  note("experiment_interrupted");
+  EXPECT_EQ(recorder_->counters().records_refused, 1U);
+  flush();
+  EXPECT_EQ(rows("SELECT kind, boot_key IS NOT NULL FROM event WHERE kind LIKE 'experiment%' ORDER BY event_row"),
+            (Rows{"experiment_paused|1", "experiment_interrupted|1"}));
+  for (int k = 0; k < 2; ++k) note("fluid_set");
+  for (std::size_t k = 0; k < storage::kMostInterruptions; ++k) note("experiment_paused");
+  EXPECT_EQ(recorder_->counters().records_refused, 1U);
+  note("experiment_paused");
+  EXPECT_EQ(recorder_->counters().records_refused, 2U);
+  flush();
+  EXPECT_EQ(number("SELECT count(*) FROM event WHERE kind LIKE 'experiment%'"), 2 + 1000);
 }
 
 TEST_F(RecorderFaultsTest, AnEventThatTheFullQueueRefusedIsAskedForAgain) {
