@@ -11,8 +11,8 @@ namespace fs = std::filesystem;
 
 namespace {
 
-WholeFile too_long(std::size_t max_bytes) {
-  return {.text = {}, .problem = "has more than " + std::to_string(max_bytes) + " bytes"};
+WholeFile too_long(std::size_t max_bytes, const std::string& size = {}) {
+  return {.text = {}, .problem = "has more than " + std::to_string(max_bytes) + " bytes" + size};
 }
 
 WholeFile refused(int error) {
@@ -37,11 +37,26 @@ WholeFile read_whole(const fs::path& file, std::size_t max_bytes) {
   if (type == fs::file_type::directory) return {.text = {}, .problem = "is a folder; give a file"};
   if (type == fs::file_type::regular) {
     const std::uintmax_t bytes = fs::file_size(file, unknown);
-    if (!unknown && bytes > max_bytes) return too_long(max_bytes);
+    if (!unknown && bytes > max_bytes) return too_long(max_bytes, ": " + std::to_string(bytes));
   }
   errno = 0;
   std::ifstream stream{file, std::ios::binary};
   return stream ? read_whole(stream, max_bytes) : refused(errno);
+}
+
+WholeFile read_line(std::istream& stream, std::size_t max_bytes) {
+  WholeFile line;
+  errno = 0;
+  bool is_there = false;
+  for (char one = 0; stream.get(one); line.text += one) {
+    is_there = true;
+    if (one == '\n') break;
+    if (line.text.size() == max_bytes) return too_long(max_bytes);
+  }
+  if (stream.bad()) return refused(errno);
+  if (!is_there) line.problem = "has no line";
+  if (line.text.ends_with('\r')) line.text.pop_back();
+  return line;
 }
 
 }  // namespace base

@@ -13,6 +13,7 @@
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
+#include "base/whole_file.hpp"
 #include "server/runtime/private_file.hpp"
 
 namespace server::config {
@@ -63,9 +64,10 @@ std::optional<FolderLock> FolderLock::try_take(const std::filesystem::path& fold
 }
 
 std::string FolderLock::holder(const std::filesystem::path& folder) {
-  std::ifstream in{lock_file(folder)};
-  std::string line;
-  return std::getline(in, line) && !line.empty() ? line : "another program";
+  constexpr std::size_t kMaxBytes = 4096;  // a name and a number
+  const std::string said = base::read_whole(lock_file(folder), kMaxBytes).text;
+  const std::string line = said.substr(0, said.find('\n'));
+  return line.empty() ? "another program" : line;
 }
 
 FolderLock::~FolderLock() {

@@ -99,7 +99,11 @@ std::optional<std::string> read_private(const fs::path& file) {
     spdlog::warn("{} was readable by others (mode {:o}); now it is not", file.string(), status.st_mode & 0777U);
     if (::fchmod(opened.number, 0600) != 0) cannot("protect", file);
   }
-  std::string content(kMaxSecretBytes, '\0');
+  const auto bytes = static_cast<std::size_t>(status.st_size);
+  if (bytes > kMaxSecretBytes) {
+    throw std::runtime_error{fmt::format("'{}' has more than {} bytes: {}", file.string(), kMaxSecretBytes, bytes)};
+  }
+  std::string content(bytes, '\0');
   const ssize_t size = ::read(opened.number, content.data(), content.size());
   if (size < 0) cannot("read", file);
   content.resize(static_cast<std::size_t>(size));

@@ -19,7 +19,7 @@ void write_private(const std::filesystem::path& file, const std::string& content
 
 // The file's content; none when there is no such file. A file that others may read is protected first, with a warning.
 // Throws std::runtime_error that names it, with what to type, when it is a link or no file, belongs to somebody who is
-// not trusted, may not be read, or may be written by others.
+// not trusted, may not be read, may be written by others, or is longer than 64 KiB.
 std::optional<std::string> read_private(const std::filesystem::path& file);
 
 // Throws std::runtime_error that names the folder, with what to type, when it belongs to somebody who is not trusted or

@@ -1,11 +1,16 @@
 // Sets up OpenSSL as a client and compares keys.
 #include "sim_robot/client/station_trust.hpp"
 
+#include <openssl/err.h>
+#include <openssl/pem.h>
+
 #include <boost/asio/ip/address.hpp>
 #include <cctype>
+#include <filesystem>
 #include <stdexcept>
 
 #include "base/tls/public_key.hpp"
+#include "base/whole_file.hpp"
 
 namespace sim_robot {
 namespace {
@@ -25,10 +30,24 @@ std::string parse_pin(const std::string& text) {
   throw std::invalid_argument("--tls-pin: '" + text + "' is not a SHA-256 of 64 hexadecimal digits");
 }
 
-void believe(SSL_CTX* context, const std::string& authority, const std::string& host) {
-  if (SSL_CTX_load_verify_locations(context, authority.c_str(), nullptr) != 1) {
-    throw std::invalid_argument("--tls-ca: '" + authority + "' holds no certificates in PEM");
+// Each certificate of the file; by OpenSSL's own reader a device without end would be read without end.
+void load_authorities(X509_STORE& store, const std::string& file) {
+  constexpr std::size_t kMaxBytes = 4 << 20;  // what Debian believes has 220 kB
+  const base::WholeFile whole = base::read_whole(std::filesystem::path{file}, kMaxBytes);
+  if (!whole.problem.empty()) throw std::invalid_argument("--tls-ca: '" + file + "' " + whole.problem);
+  const base::Openssl<BIO> in{BIO_new_mem_buf(whole.text.data(), static_cast<int>(whole.text.size()))};
+  int found = 0;
+  while (in) {
+    const base::Openssl<X509> certificate{PEM_read_bio_X509_AUX(in.get(), nullptr, nullptr, nullptr)};
+    if (!certificate) break;
+    found += X509_STORE_add_cert(&store, certificate.get());
   }
+  ERR_clear_error();  // that no more came
+  if (found == 0) throw std::invalid_argument("--tls-ca: '" + file + "' holds no certificates in PEM");
+}
+
+void believe(SSL_CTX* context, const std::string& authority, const std::string& host) {
+  load_authorities(*SSL_CTX_get_cert_store(context), authority);
   SSL_CTX_set_verify(context, SSL_VERIFY_PEER, nullptr);
   X509_VERIFY_PARAM* expected = SSL_CTX_get0_param(context);
   boost::system::error_code no_address;

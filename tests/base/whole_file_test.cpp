@@ -7,6 +7,7 @@
 #include <cerrno>
 #include <cstdlib>
 #include <fstream>
+#include <sstream>
 #include <thread>
 
 namespace base {
@@ -35,7 +36,7 @@ TEST_F(WholeFileTest, IsReadUpToTheBoundAndNotBeyond) {
   const WholeFile whole = read_whole(file, 100'000);
   EXPECT_EQ(whole.problem, "");
   EXPECT_EQ(whole.text, std::string(100'000, 'x'));
-  EXPECT_EQ(read_whole(file, 99'999).problem, "has more than 99999 bytes");
+  EXPECT_EQ(read_whole(file, 99'999).problem, "has more than 99999 bytes: 100000");
   EXPECT_EQ(read_whole(file, 99'999).text, "");
   EXPECT_EQ(read_whole(saved(""), 10).problem, "");
 }
@@ -43,11 +44,24 @@ TEST_F(WholeFileTest, IsReadUpToTheBoundAndNotBeyond) {
 // More than there is memory for: a program that began to read it would not come to an end.
 TEST_F(WholeFileTest, ThatIsTooLongIsNotBegun) {
   fs::resize_file(saved("x"), std::uintmax_t{1} << 40);
-  EXPECT_EQ(read_whole(folder_ / "file", std::size_t{1} << 39).problem, "has more than 549755813888 bytes");
+  EXPECT_EQ(read_whole(folder_ / "file", std::size_t{1} << 39).problem,
+            "has more than 549755813888 bytes: 1099511627776");
 }
 
 TEST_F(WholeFileTest, OfADeviceWithoutEndIsRefusedAtTheBound) {
   EXPECT_EQ(read_whole(fs::path{"/dev/zero"}, 1 << 20).problem, "has more than 1048576 bytes");
+}
+
+TEST_F(WholeFileTest, ALineIsReadUpToTheBoundAndNotBeyond) {
+  std::istringstream lines{"first\r\n\nthird"};
+  EXPECT_EQ(read_line(lines, 6).text, "first");
+  EXPECT_EQ(read_line(lines, 6).problem, "");
+  EXPECT_EQ(read_line(lines, 5).text, "third");
+  EXPECT_EQ(read_line(lines, 6).problem, "has no line");
+  std::istringstream longer{"longer\n"};
+  EXPECT_EQ(read_line(longer, 5).problem, "has more than 5 bytes");
+  std::ifstream endless{"/dev/zero"};
+  EXPECT_EQ(read_line(endless, 1 << 16).problem, "has more than 65536 bytes");
 }
 
 TEST_F(WholeFileTest, OfAPipeIsReadToItsEnd) {

@@ -50,6 +50,15 @@ TEST_F(PrivateFile, IsReadOrMissing) {
   EXPECT_EQ(runtime::read_private(file("secret\n")), "secret\n");
 }
 
+TEST_F(PrivateFile, ThatIsTooLongIsRefusedWithItsSize) {
+  const fs::path token = file("secret");
+  fs::resize_file(token, 65'536);
+  EXPECT_EQ(runtime::read_private(token)->size(), 65'536U);
+  fs::resize_file(token, 65'537);
+  EXPECT_EQ(refusal([&] { runtime::read_private(token); }),
+            "'" + token.string() + "' has more than 65536 bytes: 65537");
+}
+
 TEST_F(PrivateFile, ThatAllMayWriteIsRefusedWithTheLineToType) {
   const fs::path token = file("secret", 0666);
   const std::string said = refusal([&] { runtime::read_private(token); });

@@ -26,6 +26,12 @@ TEST(StationTrust, NamesTheOptionAndTheValueThatIsWrong) {
   EXPECT_THAT(mistake(std::string(63, 'a') + "g", {}), HasSubstr("64 hexadecimal digits"));
   EXPECT_THAT(mistake({}, "/none/such.crt"), HasSubstr("--tls-ca: '/none/such.crt'"));
   EXPECT_THAT(mistake({}, {}), HasSubstr("--tls-pin or --tls-ca"));
+  EXPECT_THAT(mistake({}, "/etc/hostname"), HasSubstr("'/etc/hostname' holds no certificates in PEM"));
+}
+
+// OpenSSL's own reader does not end.
+TEST(StationTrust, ReadsNoAuthorityWithoutEnd) {
+  EXPECT_EQ(mistake({}, "/dev/zero"), "--tls-ca: '/dev/zero' has more than 4194304 bytes");
 }
 
 TEST(StationTrust, TakesAPinInEitherCaseAndWithColons) {

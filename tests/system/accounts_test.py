@@ -199,6 +199,7 @@ class AccountsTest(unittest.TestCase):
                 (("user", "add", "Anna", "--role", "viewer"), PASSWORD, "is not 1 to 31 characters"),
                 (("user", "add", "anna", "--role", "viewer"), "short", "the password has 5 bytes"),
                 (("user", "add", "anna", "--role", "viewer"), "", "no password was given"),
+                (("user", "add", "anna", "--role", "viewer"), "x" * 70000, "the line of the password on standard input has more than 65536 bytes"),
                 (("user", "add", "anna", "--role", "boss"), PASSWORD, "must be one of viewer, operator, admin"),
                 (("token", "create", "x", "--scopes", "root"), "", "scope 'root' is none of"),
                 (("token", "create", "local"), "", "the station's own token"),

@@ -10,6 +10,7 @@
 #include <iostream>
 #include <stdexcept>
 
+#include "base/whole_file.hpp"
 #include "server/cli/accounts/author.hpp"
 #include "server/runtime/private_file.hpp"
 
@@ -51,17 +52,21 @@ class Silence {
   termios before_{};
 };
 
-std::string read_line() {
-  std::string line;
-  if (!std::getline(std::cin, line)) throw std::runtime_error{"no password was given on standard input"};
-  if (line.ends_with('\r')) line.pop_back();
-  return line;
+constexpr std::size_t kLongestTyped = 64 * 1024;  // no password is as long, but its length is said then
+
+std::string read_password_line() {
+  base::WholeFile line = base::read_line(std::cin, kLongestTyped);
+  if (std::cin.eof() && line.text.empty()) throw std::runtime_error{"no password was given on standard input"};
+  if (!line.problem.empty()) {
+    throw std::runtime_error{fmt::format("the line of the password on standard input {}", line.problem)};
+  }
+  return std::move(line.text);
 }
 
 std::string ask_silently(const std::string& question) {
   const Silence silence;  // before the question: what is typed early is not shown either
   fmt::print(stderr, "{}: ", question);
-  std::string line = read_line();
+  std::string line = read_password_line();
   fmt::print(stderr, "\n");
   return line;
 }
@@ -203,7 +208,7 @@ void AccountAccess::set_retired(const std::string& robot_id, bool retired) {
 }
 
 std::string read_password(const std::string& whose) {
-  if (isatty(STDIN_FILENO) == 0) return read_line();
+  if (isatty(STDIN_FILENO) == 0) return read_password_line();
   std::string password = ask_silently("Password of " + whose);
   if (ask_silently("The same again") != password) throw std::runtime_error{"the two passwords differ"};
   return password;

@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/signal_set.hpp>
 #include <chrono>
@@ -83,11 +84,16 @@ class Narrator {
   bool is_terminal_;
 };
 
-std::string text_of_file(const std::filesystem::path& file) {
-  std::ifstream in{file, std::ios::binary};
-  std::ostringstream text;
-  text << in.rdbuf();
-  return text.str();
+// Of a log, where it says why.
+std::string end_of_file(const std::filesystem::path& file) {
+  constexpr std::size_t kMostBytes = 64 * 1024;
+  std::ifstream in{file, std::ios::binary | std::ios::ate};
+  const auto bytes = static_cast<std::size_t>(std::max<std::streamoff>(in.tellg(), 0));
+  in.seekg(static_cast<std::streamoff>(bytes - std::min(bytes, kMostBytes)));
+  std::string text(std::min(bytes, kMostBytes), '\0');
+  in.read(text.data(), static_cast<std::streamsize>(text.size()));
+  text.resize(static_cast<std::size_t>(in.gcount()));
+  return text;
 }
 
 // Until `is_there`, as long as the program runs.
@@ -97,7 +103,7 @@ void wait_for(const char* what, ChildProgram& program, const std::filesystem::pa
   for (int look = 0; look < kMostLooks; ++look) {
     if (is_there()) return;
     if (program.has_ended()) {
-      throw std::runtime_error{fmt::format("{} did not start; it says:\n{}", what, text_of_file(log))};
+      throw std::runtime_error{fmt::format("{} did not start; it says:\n{}", what, end_of_file(log))};
     }
     patience.wait(kLook);
   }
@@ -255,11 +261,11 @@ int run(const Demo& options, std::ostream& out) {
     std::optional<StationClient> client;
     wait_for("the station", station, station_log, patience, [&] {
       // Not those of a station that was killed here.
-      const json addresses = json::parse(text_of_file(endpoints), nullptr, false);
+      const json addresses = json::parse(end_of_file(endpoints), nullptr, false);
       if (addresses.is_object() && addresses.value("pid", 0) == station.pid()) client.emplace(data);
       return client.has_value();
     });
-    const json addresses = json::parse(text_of_file(endpoints));
+    const json addresses = json::parse(end_of_file(endpoints));
     const auto robots = addresses.at("robots").get<std::string>();
     narrator.say(fmt::format("\npage: {}\n      (a link for one browser, once)\n", login_link(*client)));
     ChildProgram robot{own_folder() / "rheonaut-sim",

@@ -53,10 +53,9 @@ std::int64_t utc_now_us() {
 }
 
 std::string first_line_of(const fs::path& file) {
+  constexpr std::size_t kMaxBytes = 64 * 1024;
   std::ifstream in{file};
-  std::string line;
-  std::getline(in, line);
-  return line;
+  return base::read_line(in, kMaxBytes).text;
 }
 
 Redaction redaction_for(const config::Config& config) {
@@ -229,7 +228,10 @@ std::string log_lines(const SupportBundle& options) {
   }
   const std::unique_ptr<FILE, int (*)(FILE*)> journal{popen(kJournal, "r"), pclose};
   std::array<char, 4096> piece{};
-  while (journal && std::fgets(piece.data(), piece.size(), journal.get()) != nullptr) text += piece.data();
+  while (journal && std::fgets(piece.data(), piece.size(), journal.get()) != nullptr) {
+    text += piece.data();
+    if (text.size() > 2 * kMostLogBytes) text.erase(0, kMostLogBytes);
+  }
   return text.empty() ? "there is no journal of a unit rheonaut; give its log with --log FILE\n" : text;
 }
 

@@ -60,7 +60,7 @@ TEST_F(BadInput, FilesForAStationAreOfBoundedDepthAndSize) {
 TEST_F(BadInput, AFileOfAnySizeIsBounded) {
   save("large", "name = \"x\"\n");
   std::filesystem::resize_file(folder_ / "large", std::uintmax_t{1} << 30);  // sparse
-  EXPECT_THAT(complaint("profile @large"), HasSubstr("has more than 1048576 bytes"));
+  EXPECT_THAT(complaint("profile @large"), HasSubstr("large' has more than 1048576 bytes: 1073741824"));
   EXPECT_THAT(complaint("check-config --config @large"), HasSubstr("has more than 1048576 bytes"));
   EXPECT_THAT(complaint("bode --plant @large"), HasSubstr("has more than 1048576 bytes"));
   EXPECT_THAT(complaint("identify --csv @large"), HasSubstr("has more than 536870912 bytes"));
