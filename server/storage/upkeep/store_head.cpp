@@ -5,10 +5,9 @@
 #include <fmt/format.h>
 
 #include <charconv>
-#include <fstream>
-#include <iterator>
 #include <nlohmann/json.hpp>
 
+#include "base/whole_file.hpp"
 #include "server/runtime/exceptions.hpp"
 #include "server/runtime/private_file.hpp"
 #include "server/runtime/secrets.hpp"
@@ -20,7 +19,7 @@ using nlohmann::json;
 
 namespace {
 
-constexpr std::uintmax_t kMaxFileBytes = 64 * 1024;
+constexpr std::size_t kMaxFileBytes = 64 * 1024;
 
 std::string utc_text(std::int64_t at_us) {
   return fmt::format("{:%Y-%m-%d %H:%M:%S} UTC", fmt::gmtime(static_cast<std::time_t>(at_us / 1'000'000)));
@@ -81,11 +80,11 @@ Result<std::optional<HeadFile>> load_head_file(const fs::path& database) {
   if (fs::status(path, status_error).type() == fs::file_type::not_found) return std::nullopt;
   try {
     if (is_symlink(path)) throw std::runtime_error{"it is a link, which could lead to a file of somebody else"};
-    const std::uintmax_t size = fs::file_size(path);
-    if (size > kMaxFileBytes) throw std::runtime_error{fmt::format("it has {} bytes", size)};
-    std::ifstream in{path, std::ios::binary};
-    if (!in) throw std::runtime_error{"it cannot be opened"};
-    return parse({std::istreambuf_iterator<char>{in}, {}});
+    if (!is_regular_file(path)) throw std::runtime_error{"it is no file"};  // a pipe would be waited for
+    const base::WholeFile whole = base::read_whole(path, kMaxFileBytes);
+    if (whole.error != 0) throw std::runtime_error{runtime::denial(path, whole.error)};
+    if (!whole.problem.empty()) throw std::runtime_error{"it " + whole.problem};
+    return parse(whole.text);
   } catch (const json::exception&) {  // its words quote the file, whatever that holds
     return unusable(path, database, "it is not as the station writes it");
   } catch (const std::exception& error) {

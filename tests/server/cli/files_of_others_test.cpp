@@ -80,6 +80,20 @@ TEST_F(FilesOfOthers, AFileIsRefusedWithItsOwner) {
   }
 }
 
+// The database itself may be read, which says nothing of what its head file has to say.
+TEST_F(FilesOfOthers, AHeadFileIsNamedWithItsOwner) {
+  fs::create_directory(folder_ / "open");
+  fs::permissions(folder_ / "open", fs::perms{0755});
+  fs::copy_file(folder_ / "lab" / "station.sqlite", folder_ / "open" / "station.sqlite");
+  save("open/station.head.json", "{}");
+  fs::permissions(folder_ / "open" / "station.sqlite", fs::perms{0644});
+  fs::permissions(folder_ / "open" / "station.head.json", fs::perms{0600});
+  const Answer answer = ask_as_nobody("verify --data @open");
+  EXPECT_EQ(answer.exit_code, 1);
+  EXPECT_THAT(answer.text, HasSubstr(owner("open/station.head.json", "0600") + ", or type: sudo chown -R nobody '"));
+  EXPECT_THAT(answer.text, HasSubstr("whether station.sqlite has lost commits cannot be told"));
+}
+
 TEST_F(FilesOfOthers, ABackupIsNotBegunInAFolderOfAnotherUser) {
   fs::create_directory(folder_ / "own");
   {
