@@ -72,8 +72,8 @@ bool BusyWait::is_busy(const StationAnswer& answer) {
   if (clock_.steady_us() - answered_at_us_ >= longest.count()) {
     throw std::runtime_error{
         fmt::format("the station has been busy for {} s: all its connections are taken, and this question gave way to "
-                    "others; what was begun goes on without this command",
-                    std::chrono::duration_cast<std::chrono::seconds>(longest).count())};
+                    "others; {}",
+                    std::chrono::duration_cast<std::chrono::seconds>(longest).count(), advice_)};
   }
   return true;
 }
@@ -87,6 +87,11 @@ bool BusyWait::asks_again(const StationAnswer& answer) {
 void BusyWait::pause() {
   loop_.restart();
   runtime::run_first(loop_, clock_.sleep_for(rule_.pause));
+}
+
+std::string asks_for_job_again(std::int64_t job, const std::filesystem::path& data_dir) {
+  return fmt::format("job {0} goes on without this command; rheonaut job show {0} --wait --data '{1}' waits for it",
+                     job, data_dir.string());
 }
 
 nlohmann::json asked(StationAnswer answer) {

@@ -31,7 +31,9 @@ struct BusyRule {
 
 class BusyWait {
  public:
-  explicit BusyWait(BusyRule rule = {}) : rule_{rule} {}
+  // `advice`: what has become of what is waited for, and how to ask for it again.
+  explicit BusyWait(BusyRule rule = {}, std::string advice = "what was begun goes on without this command")
+      : rule_{rule}, advice_{std::move(advice)} {}
   // Whether the answer was `busy`. Any other answer begins the time anew. Throws std::runtime_error when the last other
   // answer was too long ago.
   bool is_busy(const StationAnswer& answer);
@@ -41,10 +43,14 @@ class BusyWait {
 
  private:
   BusyRule rule_;
+  std::string advice_;
   boost::asio::io_context loop_;
   runtime::SystemClock clock_{loop_};
   std::int64_t answered_at_us_ = clock_.steady_us();
 };
+
+// Of a wait for a job that did not end by its end.
+std::string asks_for_job_again(std::int64_t job, const std::filesystem::path& data_dir);
 
 // By which id the station knows this invocation of a tool: what it begins is kept alive by it alone. Random, unless the
 // tool goes on with what an earlier invocation began.

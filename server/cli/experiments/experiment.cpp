@@ -165,7 +165,8 @@ json watch(const StationClient& station, std::int64_t id) {
   bool is_interrupted = false, is_said = false, is_shown = false, is_ours = true;
   DueAct pause, abort;
   json seen = json::object();  // SAFETY: a sign of life is as old as what this tool has seen of the station
-  BusyWait busy{{.pause = std::chrono::milliseconds{kWatch_ms}}};
+  BusyWait busy{{.pause = std::chrono::milliseconds{kWatch_ms}},
+                fmt::format("rheonaut experiment show {} says what has become of it", id)};
   for (;;) {
     // A sign of life, answered without the runs. Refused when it has ended, or when somebody has taken it over: then it
     // is theirs.

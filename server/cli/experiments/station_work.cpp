@@ -46,7 +46,7 @@ std::optional<json> StationWork::look_at(const std::string& target, BusyWait& bu
 }
 
 json StationWork::finished_job(std::int64_t job_id) const {
-  BusyWait busy{busy_rule_};
+  BusyWait busy{busy_rule_, fmt::format("rheonaut job show {0} --wait waits for job {0} again", job_id)};
   for (;;) {
     std::optional<json> job = look_at(fmt::format("/api/v1/jobs/{}", job_id), busy);
     if (!job) continue;
@@ -66,7 +66,7 @@ void StationWork::resume_what_was_left(std::int64_t experiment_id) const {
 json StationWork::finished_experiment(std::int64_t experiment_id) const {
   const std::string target = fmt::format("/api/v1/experiments/{}", experiment_id);
   json seen = json::object();  // SAFETY: a sign of life is as old as what this tool has seen of the station
-  BusyWait busy{busy_rule_};
+  BusyWait busy{busy_rule_, fmt::format("rheonaut experiment show {} says what has become of it", experiment_id)};
   for (;;) {
     // Refused for one that has just ended, which the next look shows.
     const StationAnswer kept = ask_("POST", target + "/keep-alive", seen);

@@ -21,6 +21,7 @@ namespace {
 namespace asio = boost::asio;
 using asio::ip::tcp;
 using nlohmann::json;
+using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using namespace std::chrono_literals;
@@ -158,8 +159,10 @@ TEST_F(BusyStationTest, AnotherAnswerBeginsTheTimeAnew) {
 TEST_F(BusyStationTest, JobsAndExperimentsOfToolsAreNotWaitedForWithoutEnd) {
   const auto ask = [](const std::string&, const std::string&, const json&) { return kBusy; };
   const StationWork work{ask, [](const json&) { FAIL(); }, kShort};
-  EXPECT_THAT(error_of([&] { work.finished_job(1); }), HasSubstr("the station has been busy"));
-  EXPECT_THAT(error_of([&] { work.finished_experiment(1); }), HasSubstr("the station has been busy"));
+  EXPECT_THAT(error_of([&] { work.finished_job(1); }),
+              AllOf(HasSubstr("the station has been busy"), HasSubstr("rheonaut job show 1 --wait")));
+  EXPECT_THAT(error_of([&] { work.finished_experiment(1); }),
+              AllOf(HasSubstr("the station has been busy"), HasSubstr("rheonaut experiment show 1")));
 }
 
 TEST_F(BusyStationTest, AJobThatIsWaitedForIsAskedForAgain) {
@@ -170,17 +173,30 @@ TEST_F(BusyStationTest, AJobThatIsWaitedForIsAskedForAgain) {
   EXPECT_EQ(station.asked().size(), 3U);
 }
 
-TEST_F(BusyStationTest, AJobThatIsWaitedForEndsInAnError) {
-  const ScriptedStation station{folder_ / "data", {kBusy}};
+// What goes on is named, so that who began it by this command finds it again.
+TEST_F(BusyStationTest, AJobThatIsWaitedForEndsInAnErrorThatNamesIt) {
+  const ScriptedStation station{folder_ / "data", {job("waiting"), job("running"), kBusy}};
+  std::ofstream{folder_ / "job.json"} << "{}";
   JobCommand command;
-  command.act = JobCommand::Act::show;
+  command.act = JobCommand::Act::begin;
   command.data_dir = folder_ / "data";
-  command.job = 1;
+  command.file = folder_ / "job.json";
   command.waits = true;
   command.busy = kShort;
   std::ostringstream out;
-  EXPECT_THAT(error_of([&] { run(command, out); }), HasSubstr("the station has been busy"));
+  EXPECT_THAT(error_of([&] { run(command, out); }),
+              AllOf(HasSubstr("the station has been busy for 0 s"),
+                    HasSubstr("job 1 goes on without this command; rheonaut job show 1 --wait --data '" +
+                              (folder_ / "data").string() + "' waits for it")));
   EXPECT_EQ(out.str(), "");
+}
+
+TEST_F(BusyStationTest, AJobWhoseStationIsGoneIsNamed) {
+  std::filesystem::create_directories(folder_ / "data");
+  std::ofstream{folder_ / "data" / "rheonaut.token"} << "secret\n";
+  std::ofstream{folder_ / "data" / "endpoints.json"} << json{{"http", "127.0.0.1:1"}};
+  EXPECT_THAT(ask("job show 1 --wait --data @data").error,
+              AllOf(HasSubstr("does not answer"), HasSubstr("rheonaut job show 1 --wait --data")));
 }
 
 // A sign of life that gave way is followed by the next one; the end, too, is asked for again.
