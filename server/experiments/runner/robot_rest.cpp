@@ -51,7 +51,7 @@ asio::awaitable<Rest> bring_to_rest(station::Station& station, runtime::Clock& c
     // Telemetry of after the order: before it a schedule at duty 0 would look like rest.
     const bool is_shown = ordered_at_robot_us != 0 && robot->latest_robot_time_us > ordered_at_robot_us;
     if (is_shown && is_at_rest(*robot)) co_return Rest::at_rest;
-    if (robot->link == station::LinkState::connected && !is_shown) {
+    if (robot->link == station::LinkState::connected) {
       auto command = to_manual(request);
       const auto sent = co_await station.submit(std::move(command));
       if (!sent && sent.error().reason == "not_in_control") co_return Rest::of_another;

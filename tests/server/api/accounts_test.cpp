@@ -346,5 +346,17 @@ TEST_F(AccountsTest, NoExportOfARunHoldsAnyOfIt) {
   }
 }
 
+// SAFETY's test: whatever fails, what moves comes to its end.
+TEST(RightsTest, APartThatFailsKeepsNoOtherOneFromItsEnd) {
+  identity::Rights rights;
+  const auto nobody = [] { return std::set<std::string>{}; };
+  const auto fails = [](const runtime::EndedRight&) { throw std::runtime_error{"a fault"}; };
+  bool has_ended = false;
+  rights.add({"what fails", identity::Scope::command, nobody, fails});
+  rights.add({"the next", identity::Scope::command, nobody, [&](const runtime::EndedRight&) { has_ended = true; }});
+  rights.end({[](const std::string&) { return true; }, "a test"}, {});
+  EXPECT_TRUE(has_ended);
+}
+
 }  // namespace
 }  // namespace server

@@ -191,6 +191,26 @@ TEST_F(StopAllTest, ASinkThatFailsKeepsNoRecordFromBeingPublished) {
   EXPECT_THAT(notes, ElementsAre("frame a", "record a", "record a", "exception")) << "of the stop and of the duty";
 }
 
+// A sink that fails at the events of one robot.
+class FailsAtEvents final : public station::StationSink {
+ public:
+  void on_event(const station::RobotState& robot, const station::RobotEvent&) override {
+    if (robot.id == "a") throw std::runtime_error{"no disk"};
+  }
+};
+
+TEST_F(StopAllTest, ARightEndsAtEachRobotThoughOneFails) {
+  for (const char* id : {"a", "b"}) {
+    connect(id);
+    ASSERT_TRUE(station.control({id, "user:anna", "", station::ControlAction::take, 20s, ""}));
+  }
+  static FailsAtEvents fails;  // it outlives the station
+  station.add_sink(fails);
+  station.end_right({[](const std::string& actor) { return actor == "user:anna"; }, "a test"});
+  EXPECT_EQ(station.holder("a"), "");
+  EXPECT_EQ(station.holder("b"), "");
+}
+
 TEST_F(StopAllTest, ARobotThatIsAwayIsNotWaitedFor) {
   connect("a");
   station.on_disconnected(*links[0], "gone");

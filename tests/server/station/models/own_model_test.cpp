@@ -173,6 +173,22 @@ TEST_F(OwnModelTest, ThatDidNotArriveEndsWithTheRightOfItsSender) {
   EXPECT_NE(model().reason, "sent to this robot alone");
 }
 
+// SAFETY's test: the robot holds the list's bits as confirmed, and nobody with a right has sent them.
+TEST_F(OwnModelTest, AConfirmationThatIsOnItsWayWhenTheRightEndsIsTakenBack) {
+  begin();
+  name_fluid("water", "token:old");
+  for (int k = 0; k < 100 && held["model_confirmed"] == 0; ++k) live(50ms);
+  ASSERT_TRUE(holds_water());
+  ASSERT_EQ(model().state, ModelState::sending) << "the answer has not come";
+  sender.on_right_ended({[](const std::string& actor) { return actor == "token:old"; }, "revoked"});
+  duty = 0.5F;  // the robot takes nothing now
+  live(40s);
+  duty = 0;
+  live(20s);
+  EXPECT_EQ(held["model_confirmed"], 0);
+  EXPECT_NE(model().state, ModelState::confirmed);
+}
+
 TEST_F(OwnModelTest, ThatTheRobotHoldsStandsWhenTheRightOfItsSenderEnds) {
   begin();
   name_fluid("water");
