@@ -86,7 +86,7 @@ Identification with_own_dead_time(const Recording& recording, const Identificati
   Identification late = identified(recording, with_dead_time(options, recording, deadline_s - steady_now_s()));
   if (late.best.end == SearchEnd::time_limit) return late;
   const bool by_acceleration = found.best.sensor.has_value();
-  if (!is_explained_better(late.best, found.best, by_acceleration)) return found;
+  if (!is_explained_better({late.best, late.input}, {found.best, found.input}, by_acceleration)) return found;
   if (!by_acceleration) late.warnings.push_back(dead_time_in_words(late.best, recording.dt_s));
   return late;
 }

@@ -48,6 +48,15 @@ void keep_clearer(const std::optional<ScoreEvidence>& evidence, std::optional<Sc
   if (evidence && (!kept || evidence->f > kept->f)) kept = evidence;
 }
 
+// Evidence of all runs whose readings have no delay of their own.
+std::optional<ScoreEvidence> clearest_input(const Identification& found) {
+  std::optional<ScoreEvidence> clearest;
+  for (const JointRun& run : found.runs) {
+    if (!run.fit.sensor) keep_clearer(run.input, clearest);
+  }
+  return clearest;
+}
+
 // What concerns one run only.
 std::vector<std::string> doubts_of(JointSearch& search, std::size_t i, const Recording& recording,
                                    const IdentificationOptions& options, const JointRun& run) {
@@ -152,7 +161,8 @@ Identification identify_together(std::span<const Recording> recordings, const Id
       recordings, {}, [](const Recording& one) { return one.dt_s * static_cast<double>(one.duty.size()); });
   Identification late = identified(recordings, with_dead_time(options, shortest, deadline_s - steady_now_s()));
   if (late.best.end == SearchEnd::time_limit) return late;
-  if (!is_explained_better(late.best, found.best, by_acceleration)) return found;
+  const auto input_left = clearest_input(late), input_before = clearest_input(found);
+  if (!is_explained_better({late.best, input_left}, {found.best, input_before}, by_acceleration)) return found;
   if (!by_acceleration) late.warnings.push_back(dead_time_in_words(late.best, shortest.dt_s));
   return late;
 }

@@ -19,6 +19,7 @@ using Eigen::VectorXd;
 
 constexpr double kDoubtfulF = 60, kDoubtfulShare = 0.1;
 constexpr double kDoubtfulInputF = 5, kDoubtfulInputShare = 0.01, kSearchedInputF = 3;
+constexpr double kMostLeftOfInput = 0.25;      // of F, by a dead time
 constexpr double kFewestPerDirection = 10;     // values, so that this F is no chance
 constexpr double kFitOfRounding = 100 - 1e-6;  // percent
 constexpr double kWindowS = 1;                 // a clock that is off by 0.5 % drifts by half a sample
@@ -287,6 +288,11 @@ bool follows_input(const std::optional<ScoreEvidence>& evidence) {
 }
 
 bool may_lack_dead_time(const std::optional<ScoreEvidence>& input) { return input && input->f > kSearchedInputF; }
+
+bool is_settled_by_dead_time(const std::optional<ScoreEvidence>& left, const std::optional<ScoreEvidence>& before) {
+  if (!may_lack_dead_time(left)) return true;
+  return before && left->f < kMostLeftOfInput * before->f;
+}
 
 std::string dead_zone_in_words(const DeadZone& zone) {
   std::ostringstream text;

@@ -52,7 +52,10 @@ std::string dead_zone_in_words(const DeadZone& zone);
 
 bool changes_with_amplitude(const std::optional<ScoreEvidence>& evidence);
 bool follows_input(const std::optional<ScoreEvidence>& evidence);
-bool may_lack_dead_time(const std::optional<ScoreEvidence>& input);  // F above 3: worth a search, which AIC judges
+bool may_lack_dead_time(const std::optional<ScoreEvidence>& input);  // F above 3: worth a search
+// A dead time that was found is the reason for the evidence `before` where F is at most 3 with it, or less than a
+// quarter: a fluid that is not linear follows the duty nearly as much with a dead time as without.
+bool is_settled_by_dead_time(const std::optional<ScoreEvidence>& left, const std::optional<ScoreEvidence>& before);
 
 // order_is_forced: the structure was given, and it is not the fractional one; structure_option: how, or empty.
 std::vector<std::string> amplitude_doubts(const std::optional<ScoreEvidence>& evidence, const Recording& recording,

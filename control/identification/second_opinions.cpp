@@ -342,12 +342,15 @@ IdentificationOptions with_dead_time(IdentificationOptions options, const Record
   return options;
 }
 
-bool is_explained_better(const Fit& with_dead_time, const Fit& without, bool by_acceleration) {
-  if (!(with_dead_time.model.dead_time_s > 0)) return false;
-  if (!by_acceleration) return with_dead_time.aic < without.aic - kClearlyLowerAic;
+bool is_explained_better(const DeadTimeTrial& with_dead_time, const DeadTimeTrial& without, bool by_acceleration) {
+  if (!(with_dead_time.fit.model.dead_time_s > 0)) return false;
+  if (!by_acceleration) {
+    return with_dead_time.fit.aic < without.fit.aic - kClearlyLowerAic &&
+           is_settled_by_dead_time(with_dead_time.input, without.input);
+  }
   // The delay of readings that were late has become the plant's: with as many parameters the residuals are as small.
   // How many readings are left out differs, so that no AIC tells.
-  return with_dead_time.residual_sd < kAsSmall * without.residual_sd;
+  return with_dead_time.fit.residual_sd < kAsSmall * without.fit.residual_sd;
 }
 
 std::string dead_time_in_words(const Fit& fit, double dt_s) {

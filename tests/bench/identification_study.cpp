@@ -2,7 +2,8 @@
 // truth is within the sigmas of six others, each with the script of a scenario: identification_study coverage FILE
 // [SEEDS [FIRST]]. The fluid of the file comes first, then five of tests/control/fluid_family.hpp. Or how far the
 // margin of a controller that is tuned for the fit is from the true one, in fluids with a dead time that nobody names:
-// identification_study margins [SEEDS [FIRST]].
+// identification_study margins [SEEDS [FIRST]]. Or how often a fluid that is not linear has a dead time that is not
+// there, or one that is: identification_study false_dead_time [SEEDS [FIRST]].
 #include <algorithm>
 #include <array>
 #include <chrono>
@@ -192,19 +193,56 @@ void study_margins(int seeds, int first) {
   }
 }
 
+struct DeadTimeRow {
+  int fits = 0, found = 0;
+  double worst_ms = 0;  // of those that were found
+};
+
+// The fluid that thins, by a position and a duty of one amplitude, which does not show that it thins.
+DeadTimeRow dead_times_of(double dead_time_s, int seeds, int first) {
+  control::IdentificationOptions options = sim_robot::one_start_options();
+  options.tries_dead_time = true;
+  const sim_robot::IdentificationTrial trial{.fluid = {},
+                                             .duty = sim_robot::study_duty(),
+                                             .dead_time_s = dead_time_s,
+                                             .kind = sim_robot::PlantKind::shear_thinning};
+  DeadTimeRow row;
+  for (int seed = first; seed < first + seeds; ++seed) {
+    const auto recording = sim_robot::record_position(trial, kPositionSdM, static_cast<std::uint64_t>(seed));
+    const double found_s = control::identify(recording, options).best.model.dead_time_s;
+    ++row.fits;
+    if (!(found_s > 0)) continue;
+    ++row.found;
+    row.worst_ms = std::max(row.worst_ms, 1e3 * std::abs(found_s - dead_time_s));
+  }
+  return row;
+}
+
+void study_false_dead_time(int seeds, int first) {
+  std::printf("| dead time of shear_thinning (%d seeds from %d) | found | worst error |\n|---|---|---|\n", seeds,
+              first);
+  for (const double dead_time_s : {0.0, 0.04, 0.05, 0.06, 0.07, 0.08}) {
+    const DeadTimeRow row = dead_times_of(dead_time_s, seeds, first);
+    std::printf("| %g ms | %d of %d | %.1f ms |\n", 1e3 * dead_time_s, row.found, row.fits, row.worst_ms);
+    std::fflush(stdout);
+  }
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
   std::optional<std::string> file;
   if (argc > 2 && std::string_view{argv[1]} == "coverage") file = argv[2], argv += 2, argc -= 2;
   const bool wants_margins = argc > 1 && std::string_view{argv[1]} == "margins";
-  if (wants_margins) ++argv, --argc;
+  const bool wants_dead_times = argc > 1 && std::string_view{argv[1]} == "false_dead_time";
+  if (wants_margins || wants_dead_times) ++argv, --argc;
   const int seeds = argc > 1 ? std::atoi(argv[1]) : 40;
   const int first = argc > 2 ? std::atoi(argv[2]) : 1;
   if (seeds < 1) return std::fprintf(stderr, "identification_study: SEEDS '%s' is no positive number\n", argv[1]), 2;
   if (first < 1) return std::fprintf(stderr, "identification_study: FIRST '%s' is no positive number\n", argv[2]), 2;
   if (file) return study_coverage(*file, seeds, first), 0;
   if (wants_margins) return study_margins(seeds, first), 0;
+  if (wants_dead_times) return study_false_dead_time(seeds, first), 0;
   std::printf(
       "| kp, b1, b2, alpha, beta (%d seeds from %d) | response within 2 %% | worst | parameters within 3 sigma | worst "
       "| "

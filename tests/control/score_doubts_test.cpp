@@ -10,6 +10,7 @@
 #include <random>
 #include <vector>
 
+#include "control/identification/second_opinions.hpp"
 #include "recorded_runs.hpp"
 
 namespace control {
@@ -148,6 +149,21 @@ TEST(InputDoubt, ADriftAndColouredNoiseDoNotFollowTheDuty) {
     EXPECT_FALSE(has_doubt(found, DoubtCode::correlated_with_input)) << found.input->f;
     EXPECT_EQ(found.best.model.dead_time_s, 0);
   }
+}
+
+// A lower AIC alone does not show it: a fluid that thins lowers it with a dead time that is not there.
+TEST(InputDoubt, ADeadTimeIsTakenOnlyIfTheResidualsHardlyFollowTheDutyWithIt) {
+  const auto is_taken = [](double f_left, double f_before, double lower_aic) {
+    Fit without, with;
+    with.model.dead_time_s = 0.02;
+    with.aic = without.aic - lower_aic;
+    const std::optional<ScoreEvidence> left = ScoreEvidence{.f = f_left}, before = ScoreEvidence{.f = f_before};
+    return is_explained_better({with, left}, {without, before}, false);
+  };
+  EXPECT_TRUE(is_taken(2.9, 4, 11)) << "nothing that asks for one is left";
+  EXPECT_TRUE(is_taken(20, 81, 11)) << "less than a quarter";
+  EXPECT_FALSE(is_taken(3.1, 8, 11));
+  EXPECT_FALSE(is_taken(2.9, 4, 9));
 }
 
 TEST(InputDoubt, AnOrderThatWasForcedIsNoDeadTime) {

@@ -79,6 +79,20 @@ TEST(IdentifyAmplitude, ADeadTimeThatIsNotFittedIsAnotherDoubt) {
   EXPECT_FALSE(doubts_amplitude(nearly_without_noise));
 }
 
+// A duty of one size does not show that it thins, but its residuals follow the duty.
+TEST(IdentifyAmplitude, AFluidThatThinsHasNoDeadTimeButItsOwn) {
+  control::IdentificationOptions options = one_start_options();
+  options.tries_dead_time = true;
+  for (const std::uint64_t seed : {1U, 2U, 3U, 4U, 5U, 6U}) {
+    IdentificationTrial trial = thinning(study_duty());
+    const auto prompt = control::identify(record_position(trial, kPositionSdM, seed), options);
+    EXPECT_EQ(prompt.best.model.dead_time_s, 0) << seed;
+    trial.dead_time_s = 0.04;
+    const auto late = control::identify(record_position(trial, kPositionSdM, seed), options);
+    EXPECT_NEAR(late.best.model.dead_time_s, 0.04, 0.015) << seed;
+  }
+}
+
 // Few and far between, steps do not tell the sensor's clock: each has readings of the age that it happens to have.
 TEST(IdentifyAmplitude, AnotherAgeOfTheReadingsInEachStepIsNoAmplitude) {
   constexpr std::uint64_t kUnluckySeed = 119;
