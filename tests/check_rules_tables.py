@@ -14,7 +14,7 @@ MAY_INCLUDE = {
 # ARCHITECTURE.md lists them in this order. server/main.cpp and sim_robot/main.cpp stand above all.
 ROOMS = """
 base base/command_line base/failures base/tls
-control/models control/responses control/sensor control/search control/identification control/discretisation
+control/models control/responses control/sensor control/search control/evidence control/identification control/discretisation
 control/tuning sim_robot/world sim_robot/robot sim_robot/network sim_robot/faults sim_robot/scenario sim_robot/lab
 sim_robot/client sim_robot/fleet sim_robot/proxy sim_robot/cli
 server/runtime server/config server/tls server/net

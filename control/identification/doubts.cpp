@@ -8,8 +8,8 @@
 #include <sstream>
 #include <utility>
 
+#include "control/evidence/score_doubts.hpp"
 #include "control/identification/identifiability.hpp"
-#include "control/identification/score_doubts.hpp"
 #include "control/sensor/sensor_prior.hpp"
 
 namespace control {

@@ -6,11 +6,12 @@
 #include <map>
 #include <utility>
 
+#include "control/evidence/score_doubts.hpp"
 #include "control/identification/fit_summary.hpp"
+#include "control/identification/further_search.hpp"
 #include "control/identification/identifiability.hpp"
 #include "control/identification/recording_checks.hpp"
 #include "control/identification/residual_doubts.hpp"
-#include "control/identification/score_doubts.hpp"
 #include "control/identification/second_opinions.hpp"
 #include "control/identification/structure_choice.hpp"
 #include "control/identification/unit_doubts.hpp"
@@ -47,7 +48,8 @@ Identification identified(const Recording& recording, const IdentificationOption
   result.best = result.compared.front();
   result.amplitude = amplitude_evidence(search, recording, result.best, points[result.best.structure]);
   result.input = input_evidence(search, recording, result.best, points[result.best.structure]);
-  result.dead_zone = dead_zone_evidence(search, recording, result.best, points[result.best.structure]);
+  const FittedRun fitted{search, recording, result.best, points[result.best.structure]};
+  result.dead_zone = dead_zone_evidence({&fitted, 1});
   std::vector<std::string>& warnings = result.warnings;
   const auto add = [&](std::vector<std::string> more) { std::ranges::move(more, std::back_inserter(warnings)); };
   add(unit_doubts(recording));
@@ -91,32 +93,15 @@ Identification with_own_dead_time(const Recording& recording, const Identificati
   return late;
 }
 
-// The same record by what the motor made of the duty; taken if that leaves less, and no amplitude.
-bool is_better_beyond(const Identification& beyond, const Identification& all) {
-  const bool has_converged = beyond.best.end == SearchEnd::converged || beyond.best.end == SearchEnd::iteration_limit;
-  return has_converged && beyond.best.residual_sd < all.best.residual_sd && !changes_with_amplitude(beyond.amplitude);
-}
-
 }  // namespace
 
 Identification identify(const Recording& recording, const IdentificationOptions& options) {
   check_recording(recording);
   check_options(options, recording);
-  const double deadline_s = steady_now_s() + options.time_limit_s;
-  Identification found = with_own_dead_time(recording, options);
-  if (!found.dead_zone) return found;
-  const DeadZone zone = *std::exchange(found.dead_zone, std::nullopt);
-  Recording driven = recording;
-  driven.duty = beyond_dead_zone(std::move(driven.duty), zone);
-  IdentificationOptions in_time = options;
-  in_time.time_limit_s = deadline_s - steady_now_s();
-  Identification beyond = with_own_dead_time(driven, in_time);
-  if (beyond.best.end == SearchEnd::time_limit) return beyond;
-  if (!is_better_beyond(beyond, found)) return found;
-  beyond.dead_zone = zone;
-  beyond.doubts.push_back({DoubtCode::dead_zone, zone.from_duty});
-  beyond.warnings.push_back(dead_zone_in_words(zone));
-  return beyond;
+  const Searching search = [](std::span<const Recording> one, const IdentificationOptions& of_search) {
+    return with_own_dead_time(one.front(), of_search);
+  };
+  return with_own_dead_zone({&recording, 1}, options, search);
 }
 
 Fit evaluate(const FractionalModel& model, const Recording& recording, const IdentificationOptions& options) {

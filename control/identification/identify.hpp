@@ -35,9 +35,10 @@
 #include <string>
 #include <vector>
 
+#include "control/evidence/dead_zone.hpp"
+#include "control/evidence/score_doubts.hpp"
 #include "control/identification/doubts.hpp"
 #include "control/identification/planned_experiment.hpp"
-#include "control/identification/score_doubts.hpp"
 #include "control/search/fit.hpp"
 
 namespace control {

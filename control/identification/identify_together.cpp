@@ -5,12 +5,13 @@
 #include <utility>
 
 #include "base/invalid_argument.hpp"
+#include "control/evidence/score_doubts.hpp"
+#include "control/identification/further_search.hpp"
 #include "control/identification/identifiability.hpp"
 #include "control/identification/identify.hpp"
 #include "control/identification/joint_fit.hpp"
 #include "control/identification/recording_checks.hpp"
 #include "control/identification/residual_doubts.hpp"
-#include "control/identification/score_doubts.hpp"
 #include "control/identification/second_opinions.hpp"
 #include "control/identification/structure_choice.hpp"
 #include "control/identification/unit_doubts.hpp"
@@ -85,6 +86,16 @@ void add_runs(JointSearch& search, std::span<const Recording> recordings, const 
   }
 }
 
+// In the motor of all of them.
+std::optional<DeadZone> common_dead_zone(JointSearch& search, std::span<const Recording> recordings,
+                                         const JointResult& found, const Identification& result) {
+  std::vector<FittedRun> fitted;
+  for (std::size_t i = 0; i < recordings.size(); ++i) {
+    fitted.push_back({search.of_run(i), recordings[i], result.runs[i].fit, found.points[i]});
+  }
+  return dead_zone_evidence(fitted);
+}
+
 // The farthest of the runs, of each parameter of a sensor.
 void add_sensors(Identification& result) {
   for (const JointRun& run : result.runs) {
@@ -121,6 +132,7 @@ Identification identified(std::span<const Recording> recordings, const Identific
   result.best = result.compared.front();
   const Structure best = result.best.structure;
   add_runs(search, recordings, options, found[best], std::move(fits[best]), result);
+  result.dead_zone = common_dead_zone(search, recordings, found[best], result);
   std::vector<std::string>& warnings = result.warnings;
   append(warnings, search_doubts(result.best, options));
   append(warnings, untried_structures(result.compared));
@@ -142,11 +154,8 @@ Identification identified(std::span<const Recording> recordings, const Identific
   return result;
 }
 
-}  // namespace
-
-Identification identify_together(std::span<const Recording> recordings, const IdentificationOptions& options) {
-  if (recordings.size() == 1) return identify(recordings.front(), options);
-  check_together(recordings, options);
+// Without a dead time that nobody named, or with it where a run asks for one and all are explained better.
+Identification with_own_dead_time(std::span<const Recording> recordings, const IdentificationOptions& options) {
   const double deadline_s = steady_now_s() + options.time_limit_s;
   Identification found = identified(recordings, options);
   bool asks = false, by_acceleration = false;
@@ -165,6 +174,14 @@ Identification identify_together(std::span<const Recording> recordings, const Id
   if (!is_explained_better({late.best, input_left}, {found.best, input_before}, by_acceleration)) return found;
   if (!by_acceleration) late.warnings.push_back(dead_time_in_words(late.best, shortest.dt_s));
   return late;
+}
+
+}  // namespace
+
+Identification identify_together(std::span<const Recording> recordings, const IdentificationOptions& options) {
+  if (recordings.size() == 1) return identify(recordings.front(), options);
+  check_together(recordings, options);
+  return with_own_dead_zone(recordings, options, with_own_dead_time);
 }
 
 }  // namespace control

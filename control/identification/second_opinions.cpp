@@ -9,9 +9,9 @@
 #include <utility>
 
 #include "base/invalid_argument.hpp"
+#include "control/evidence/score_doubts.hpp"
 #include "control/identification/fit_summary.hpp"
 #include "control/identification/residual_doubts.hpp"
-#include "control/identification/score_doubts.hpp"
 #include "control/search/fit_statistics.hpp"
 #include "control/search/missed_ticks.hpp"
 #include "control/sensor/sensor_prior.hpp"
@@ -27,7 +27,6 @@ constexpr std::ptrdiff_t kFewest = 20;                    // samples of the begi
 constexpr double kRoughBeginning = 3;                     // times the size of the other residuals, by the medians
 constexpr double kNoticeableLagS = 0.002;                 // twice what the age of the samples is known to
 constexpr double kLagsOfTheSensor = 2;                    // sds of its own lag that a delay is not called a dead time
-constexpr double kLongestTriedS = 0.2;                    // of dead times that nobody named
 constexpr double kAsSmall = 1.02;                         // of residuals, relative
 constexpr double kMotionSigmas = 5, kMotionShare = 0.01;  // of v0, and of the squares that it explains
 constexpr double kNoticeableRows = 0.3;                   // of a duty that is shifted, to first order
@@ -333,13 +332,6 @@ bool asks_for_dead_time(const Recording& recording, const IdentificationOptions&
   const double age_s = fit.sensor->has_own_clock ? recording.dt_s / 2 : recording.dt_s;  // at most
   const double late_s = fit.sensor->delay_s - age_s - options.sensor_lag_s.value_or(0);
   return late_s > (options.sensor_lag_s ? kNoticeableLagS : kLagsOfTheSensor * kLagSdS);
-}
-
-IdentificationOptions with_dead_time(IdentificationOptions options, const Recording& shortest, double left_s) {
-  const double duration_s = shortest.dt_s * static_cast<double>(shortest.duty.size());
-  options.longest_dead_time_s = std::min(kLongestTriedS, duration_s / 4);
-  options.time_limit_s = left_s;
-  return options;
 }
 
 bool is_explained_better(const DeadTimeTrial& with_dead_time, const DeadTimeTrial& without, bool by_acceleration) {

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <random>
 #include <vector>
 
 #include "control/identification/identifiability.hpp"
@@ -111,6 +112,57 @@ TEST(DeadZone, IsNotSeenInAMotorWithoutOne) {
 TEST(DeadZone, IsNotAskedForWhereEachDutyMovesTheRobot) {
   const Identification found = identify(accelerations(prbs_duty(0.6, 0.4, 20, kPushTickS), 0.08, 1), one_start_only());
   EXPECT_FALSE(found.dead_zone);
+}
+
+// Levels of both signs for half a second each, never 0.
+std::vector<double> levels_without_rest(const std::vector<double>& levels, int bits, unsigned seed) {
+  std::mt19937 random(seed);
+  std::vector<double> all;
+  for (int bit = 0; bit < bits; ++bit) {
+    const double level = levels[random() % levels.size()];
+    all.insert(all.end(), 50, random() % 2 == 0 ? level : -level);
+  }
+  return all;
+}
+
+// The robot is at rest at the smallest duty, which is not 0.
+TEST(DeadZone, IsNamedAboveTheSmallestDutyOfARecordThatIsNeverAtRest) {
+  const std::vector<double> duty = levels_without_rest({0.06, 0.15, 0.3}, 40, 5);
+  for (const unsigned seed : {1U, 2U, 3U}) {
+    const Identification found = identify(accelerations(duty, 0.1, seed), one_start_only());
+    ASSERT_TRUE(found.dead_zone) << seed;
+    EXPECT_EQ(found.dead_zone->from_duty, 0.06);
+    EXPECT_EQ(found.dead_zone->to_duty, 0.15);
+    EXPECT_FALSE(identify(accelerations(duty, 0, seed), one_start_only()).dead_zone) << seed;
+  }
+}
+
+Recording positions(const std::vector<double>& duty, double dead_zone, unsigned seed) {
+  Recording run{kPushTickS, duty, {}, {}};
+  run.position_m = output_of(kFluidOfMotor, Channel::position, kPushTickS, made_by_motor(duty, dead_zone));
+  add_noise(run.position_m, 2e-4, seed);
+  return run;
+}
+
+TEST(DeadZone, OfSeveralRunsIsNamedOnceAndTheFluidComesOutAsWithoutIt) {
+  for (const auto& make : {accelerations, positions}) {
+    const auto together = [&make](double dead_zone) {
+      const std::vector<Recording> runs{make(pushes(kPushed), dead_zone, 1), make(pushes(kPushed), dead_zone, 2)};
+      return identify_together(runs, one_start_only());
+    };
+    const Identification found = together(0.08), without = together(0);
+    ASSERT_TRUE(found.dead_zone);
+    EXPECT_FALSE(without.dead_zone);
+    EXPECT_EQ(found.dead_zone->from_duty, 0.06);
+    EXPECT_EQ(found.dead_zone->to_duty, 0.1);
+    EXPECT_THAT(found.warnings, Contains(kStandsStill).Times(1));
+    EXPECT_EQ(std::ranges::count(found.doubts, DoubtCode::dead_zone, &Doubt::code), 1);
+    ASSERT_EQ(found.runs.size(), 2U);
+    const auto parameters = parameters_of(found.best.model), expected = parameters_of(without.best.model);
+    for (std::size_t i = 0; i < kParameters; ++i) {
+      EXPECT_NEAR(parameters[i], expected[i], 3 * *found.best.one_sigma[i]) << kParameterNames[i];
+    }
+  }
 }
 
 // A drag that grows with the speed is no dead zone.

@@ -1,6 +1,6 @@
 // Residuals that are put down to amplitude: a drag behind a dead time is, an order that was forced is not.
 // And what to another linear model, as a dead time is, which is then looked for.
-#include "control/identification/score_doubts.hpp"
+#include "control/evidence/score_doubts.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -18,11 +18,7 @@
 // response. F is divided by n/n_effective of what is left, and the widening counts what chance does not explain.
 // Doubtful is F above 5 with a share of at least 1 %; fewer than 10 values for a column of E say nothing. Figures of
 // both over fluids and seeds are in docs/control.md.
-// A dead zone z of the motor: E is the model's output for the duties below z alone, which the motor did not make.
-//
-//   r = J a - c m(z) + noise,  m(z): the output for u 1(|u| < z)                                        (5)   c about 1
-// Candidates for z lie between the duties of the record; the one that explains most is asked for where it explains 10 %
-// and F is above 60 with c from 0.5 to 2. Errors: none thrown.
+// Errors: none thrown.
 #pragma once
 
 #include <optional>
@@ -40,15 +36,6 @@ std::optional<ScoreEvidence> amplitude_evidence(OutputErrorSearch& search, const
 
 std::optional<ScoreEvidence> input_evidence(OutputErrorSearch& search, const Recording& recording, const Fit& fit,
                                             const SearchPoint& point);
-
-// Where a motor begins to turn: above the one duty, at the other.
-struct DeadZone {
-  double from_duty = 0, to_duty = 0;
-};
-std::optional<DeadZone> dead_zone_evidence(OutputErrorSearch& search, const Recording& recording, const Fit& fit,
-                                           const SearchPoint& point);
-std::vector<double> beyond_dead_zone(std::vector<double> duty, const DeadZone& zone);  // 0 below it
-std::string dead_zone_in_words(const DeadZone& zone);
 
 bool changes_with_amplitude(const std::optional<ScoreEvidence>& evidence);
 bool follows_input(const std::optional<ScoreEvidence>& evidence);
