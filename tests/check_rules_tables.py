@@ -22,12 +22,12 @@ server/station/state server/station/commands server/station server/station/model
 server/storage/database server/storage/audit server/storage/samples server/storage/commits server/storage/ingest server/storage/groups
 server/storage/runs server/storage/finalizing server/storage/jobs server/storage/designs server/storage/experiments server/storage/reservations
 server/storage/query server/storage/export server/storage/export/mat server/storage/export/mcap server/storage/upkeep server/storage
-server/analysis/metrics server/analysis/comparison server/analysis/report server/analysis/capsule server/analysis server/analysis/tuning
+server/analysis/metrics server/analysis/comparison server/analysis/report server/analysis/capsule server/analysis/search server/analysis server/analysis/tuning
 server/analysis/documents server/experiments server/experiments/adaptive server/experiments/runner server/identity server/http
 server/api/bodies server/api/routes server/api/analysis server/api/experiments server/api server/cli/terminal server/cli/design
 server/cli/accounts server/cli/robots server/cli/analysis server/cli/data server/cli/experiments server/cli/commission server/cli/health server/cli server/exporter
 """.split()
-ROOMS_WITH_CONTROL = {"server/" + room for room in "analysis analysis/metrics analysis/tuning experiments experiments/adaptive experiments/runner cli/design".split()}
+ROOMS_WITH_CONTROL = {"server/" + room for room in "analysis analysis/metrics analysis/search analysis/tuning experiments experiments/adaptive experiments/runner cli/design".split()}
 # What decides only about the order of work, and the files of server/ that know it ("Threads of the station").
 SEAMS = {
     "server/net/poll_set.hpp": {"server/net/poll_set.cpp", "server/net/byte_stream.cpp", "server/link/robot_listener.hpp"},

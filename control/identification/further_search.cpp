@@ -13,6 +13,19 @@ namespace {
 
 constexpr double kLongestTriedS = 0.2;  // of dead times that nobody named
 
+using Watcher = std::function<bool(const Progress&)>;
+
+// The watcher of a search for that purpose, which it learns at once.
+Watcher watcher_for(bool Progress::* purpose, const Watcher& on_progress) {
+  if (!on_progress) return {};
+  const auto marked = [purpose, on_progress](Progress progress) {
+    progress.*purpose = true;
+    return on_progress(progress);
+  };
+  const bool goes_on = marked({});
+  return [goes_on, marked](const Progress& progress) { return goes_on && marked(progress); };
+}
+
 bool has_ended(const Fit& fit) { return fit.end == SearchEnd::converged || fit.end == SearchEnd::iteration_limit; }
 
 // Logarithm of the residuals' sd by that of the other fit, in the mean over the values of all runs.
@@ -33,6 +46,7 @@ IdentificationOptions with_dead_time(IdentificationOptions options, const Record
   const double duration_s = shortest.dt_s * static_cast<double>(shortest.duty.size());
   options.longest_dead_time_s = std::min(kLongestTriedS, duration_s / 4);
   options.time_limit_s = left_s;
+  options.on_progress = watcher_for(&Progress::is_for_dead_time, options.on_progress);
   return options;
 }
 
@@ -46,6 +60,7 @@ Identification with_own_dead_zone(std::span<const Recording> recordings, const I
   for (Recording& one : driven) one.duty = beyond_dead_zone(std::move(one.duty), zone);
   IdentificationOptions without_its_duties = options;
   without_its_duties.time_limit_s = deadline_s - steady_now_s();
+  without_its_duties.on_progress = watcher_for(&Progress::is_for_dead_zone, options.on_progress);
   Identification beyond = search(driven, without_its_duties);
   if (beyond.best.end == SearchEnd::time_limit) return beyond;
   const bool is_better = has_ended(beyond.best) && relative_sd(beyond, found, recordings) < 0;

@@ -1,7 +1,8 @@
 // Further searches of the same records, where the first one asks for them: with a dead time that nobody named, or
 // without the duties at which the motor stands still.
 //
-// Each has what is left of the time. Errors: none thrown.
+// Each has what is left of the time, and reports its progress as what it is, once before its first step. Errors: none
+// thrown.
 #pragma once
 
 #include <functional>

@@ -48,9 +48,11 @@ inline constexpr std::size_t kMostSamples = 200000;  // of a recording and of a 
 
 struct Progress {
   Structure structure = Structure::fractional;
-  int start = 0, starts = 0;  // which of the multi-starts, from 0
+  int start = 0, starts = 0;  // which of the multi-starts, from 0; before the first one there are none
   int iteration = 0;
   double sse = 0;
+  bool is_for_dead_time = false;  // a further search of the same record: with a dead time that nobody named,
+  bool is_for_dead_zone = false;  // or without the duties at which the motor stands still
 };
 
 // The names of options for the advice in a warning, as its reader gives them: "--dead-time-s". Empty: the reader cannot

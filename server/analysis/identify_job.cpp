@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "server/analysis/identification_answer.hpp"
+#include "server/analysis/search/search_progress.hpp"
 
 namespace server::analysis {
 namespace asio = boost::asio;
@@ -25,19 +26,6 @@ Result<RunOfMany> recording_in(const ReadRun& read, ChannelChoice channels) {
   Error error = recording.error();
   error.detail = fmt::format("run {}: {}", read.part.run, error.detail);
   return std::unexpected{std::move(error)};
-}
-
-// Of the whole search, from what one start says.
-double share_of(const control::Progress& progress, const control::IdentificationOptions& options) {
-  const int structures = options.structure ? 1 : 3;
-  int index = 0;
-  if (!options.structure) {
-    index = progress.structure == control::Structure::first_order    ? 0
-            : progress.structure == control::Structure::second_order ? 1
-                                                                     : 2;
-  }
-  const double within = static_cast<double>(progress.start) / std::max(progress.starts, 1);
-  return (index + within) / structures;
 }
 
 OrderedJson quality_json(const control::Fit& fit) {
@@ -114,9 +102,9 @@ OrderedJson found_json(std::span<const RunOfMany> runs, control::Identification 
 Result<std::string> compute(std::span<const RunOfMany> runs, const RunOfMany* validation, IdentifyRequest request,
                             const std::optional<ModelInUse>& in_use, storage::JobRun& run) {
   control::IdentificationOptions& search = request.search;
-  search.on_progress = [&run, &search](const control::Progress& progress) {
-    run.report(share_of(progress, search), fmt::format("{}: start {} of {}, iteration {}", text(progress.structure),
-                                                       progress.start + 1, progress.starts, progress.iteration));
+  SearchShare share{search.structure.has_value()};
+  search.on_progress = [&run, &share](const control::Progress& progress) {
+    run.report(share.at(progress), in_words(progress));
     return !run.is_cancelled();
   };
   run.report(0, "searching");
@@ -124,6 +112,7 @@ Result<std::string> compute(std::span<const RunOfMany> runs, const RunOfMany* va
       runs.size() == 1 ? identify_run(runs.front().recorded, search) : identify_runs(runs, search);
   if (run.is_cancelled()) return fail(ErrorCode::conflict, "cancelled");
   if (is_out_of_time(found.best)) return std::unexpected{out_of_time(search.time_limit_s)};
+  search.on_progress = [&run](const control::Progress&) { return !run.is_cancelled(); };
   run.report(1, "trying the model on other data");
   const bool has_model = std::isfinite(found.best.sse);
   const control::FractionalModel model = found.best.model;

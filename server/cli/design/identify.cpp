@@ -18,6 +18,7 @@
 
 #include "control/identification/identifiability.hpp"
 #include "server/analysis/identification_answer.hpp"
+#include "server/analysis/search/search_progress.hpp"
 #include "server/cli/terminal/exit_status.hpp"
 #include "server/cli/terminal/options.hpp"
 #include "server/cli/terminal/progress.hpp"
@@ -135,8 +136,7 @@ control::Identification search(const Identify& options, std::span<const analysis
   settings.names = {"--dead-time-s", "--sensor-lag-s", "--offset", "--structure"};
   Progress shown{"identify", options.form};
   settings.on_progress = [&shown](const control::Progress& progress) {
-    shown.set_detail(fmt::format("{}, start {} of {}, iteration {}, sse {:.6g}", text(progress.structure),
-                                 progress.start + 1, progress.starts, progress.iteration, progress.sse));
+    shown.set_detail(fmt::format("{}, sse {:.6g}", analysis::in_words(progress), progress.sse));
     return true;
   };
   return runs.size() == 1 ? analysis::identify_run(runs.front().recorded, settings)
