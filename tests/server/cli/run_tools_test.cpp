@@ -2,7 +2,9 @@
 #include <gmock/gmock.h>
 
 #include <cmath>
+#include <regex>
 #include <set>
+#include <string>
 #include <utility>
 
 #include "tests/server/cli/run_tools_fixture.hpp"
@@ -105,6 +107,28 @@ TEST_F(RunTools, IdentifySaysHowMuchDeadTimeTheSensorsReadingsMayHide) {
   EXPECT_THAT(ask(ask_it).text, HasSubstr(doubt));
   EXPECT_THAT(ask(ask_it + "--json").json()["warnings"].dump(), HasSubstr(doubt));
   EXPECT_THAT(ask(ask_it + "--sensor-lag-s 0.03").text, Not(HasSubstr(doubt)));
+}
+
+// The two are not to be added: of samples in step with the ticks half a period is their age, the rest is the dead time.
+TEST_F(RunTools, IdentifySaysThatTheDelayOfTheReadingsHoldsTheDeadTime) {
+  control::FractionalModel late = control::kNonNewtonianModel;
+  late.dead_time_s = 0.06;
+  plant_ = control::ModalPlant{late, 0.01};
+  begin();
+  robot_.context.position_sd_m = 0.004F;
+  for (const double duty : {0.0, 0.4, -0.5, 0.6, -0.6, 0.3}) swim_on_the_accelerometer(100, duty);
+  flush();
+  const std::string ask_it = "identify --run 1 --structure fractional ";
+  const std::string text = ask(ask_it).text;
+  const std::regex sentence{
+      "readings ([0-9.]+) ms late in the mean, the dead time of ([0-9.]+) ms included, and by a "};
+  std::smatch found;
+  ASSERT_TRUE(std::regex_search(text, found, sentence)) << text;
+  const double late_ms = std::stod(found[1]), dead_time_ms = std::stod(found[2]);
+  EXPECT_NEAR(dead_time_ms, 60, 6);
+  EXPECT_NEAR(late_ms - dead_time_ms, 5, 0.011);
+  EXPECT_THAT(ask(ask_it + "--dead-time-s 0").text, AllOf(HasSubstr(" ms late in the mean and by a low pass"),
+                                                          Not(HasSubstr("included")), HasSubstr("dead time 0 s")));
 }
 
 TEST_F(RunTools, IdentifyFitsAKnownPositionAloneFromRunAndCsvAlike) {
