@@ -8,7 +8,7 @@
 #include <functional>
 #include <span>
 
-#include "control/identification/identify.hpp"
+#include "control/identification/identification.hpp"
 
 namespace control {
 
