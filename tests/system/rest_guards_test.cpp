@@ -87,6 +87,18 @@ TEST_F(RestGuardsTest, AnotherNameThatEndsMeanwhileMovesItNoLonger) {
   }
 }
 
+// A sample of the time at which the robot took the order does not show it, since it is made first.
+TEST_F(RestGuardsTest, AnOrderThatIsAnsweredAndNotYetShownIsNoRest) {
+  for (int phase_ms = 0; phase_ms < 10; ++phase_ms) {
+    order("boris", sim_robot::set_auto(0.1F));
+    clock.run_for(4ms);
+    end_right_of("boris");
+    clock.run_for(1s);
+    EXPECT_TRUE(is_at_rest()) << phase_ms;
+    clock.run_for(1s + std::chrono::milliseconds{phase_ms});
+  }
+}
+
 // --- what is owed ---
 
 TEST_F(RestGuardsTest, WhatARobotThatIsAwayIsOwedIsOnDisk) {

@@ -48,7 +48,8 @@ OrdersAhead OrderTimeline::ahead(const RobotState& robot, const RobotCommands& c
   const std::uint64_t now_us = robot.latest_robot_time_us;
   const std::uint32_t tick_us = robot.sample_period_us;
   const auto add = [this, &robot, &commands, &orders](const PendingCommand& pending, OrderAhead order) {
-    const bool is_shown = order.until_robot_us + robot.sample_period_us <= next_sample_at_robot_us_;
+    // SAFETY: a sample of the very time at which an order was taken was made before it, and does not show it.
+    const bool is_shown = order.until_robot_us + robot.sample_period_us < next_sample_at_robot_us_;
     if (!is_shown && !is_dropped_in_time(robot, commands, pending, order.from_robot_us)) orders.push_back(order);
   };
   const auto add_unanswered = [&add, now_us, tick_us](const PendingCommand& pending) {
