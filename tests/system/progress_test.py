@@ -61,7 +61,7 @@ class ProgressTest(unittest.TestCase):
         lines = shown.split("\r\x1b[K")
         self.assertGreaterEqual(len(lines), 3, shown)
         for line in lines[1:-1]:
-            self.assertRegex(line, r"^identify: (fractional, start \d of \d, iteration \d+, sse \S+, )?\d+ s$")
+            self.assertRegex(line, r"^identify: (fractional: start \d of \d, iteration \d+, sse \S+, )?\d+ s$")
         self.assertIn("iteration", shown)
         self.assertEqual((lines[0], lines[-1]), ("", ""))
         self.assertNotIn("\n", shown)
