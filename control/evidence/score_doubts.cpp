@@ -113,8 +113,8 @@ bool follows_input(const std::optional<ScoreEvidence>& evidence) {
 bool may_lack_dead_time(const std::optional<ScoreEvidence>& input) { return input && input->f > kSearchedInputF; }
 
 bool is_settled_by_dead_time(const std::optional<ScoreEvidence>& left, const std::optional<ScoreEvidence>& before) {
-  if (!may_lack_dead_time(left)) return true;
-  return before && left->f < kMostLeftOfInput * before->f;
+  if (!left) return false;
+  return !may_lack_dead_time(left) || (before && left->f < kMostLeftOfInput * before->f);
 }
 
 std::vector<std::string> amplitude_doubts(const std::optional<ScoreEvidence>& evidence, const Recording& recording,

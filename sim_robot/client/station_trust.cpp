@@ -42,7 +42,9 @@ void load_authorities(X509_STORE& store, const std::string& file) {
     if (!certificate) break;
     found += X509_STORE_add_cert(&store, certificate.get());
   }
+  const bool is_whole = found == 0 || ERR_GET_REASON(ERR_peek_last_error()) == PEM_R_NO_START_LINE;
   ERR_clear_error();  // that no more came
+  if (!is_whole) throw std::invalid_argument("--tls-ca: '" + file + "' holds a certificate that is damaged");
   if (found == 0) throw std::invalid_argument("--tls-ca: '" + file + "' holds no certificates in PEM");
 }
 

@@ -164,6 +164,7 @@ TEST(InputDoubt, ADeadTimeIsTakenOnlyIfTheResidualsHardlyFollowTheDutyWithIt) {
   EXPECT_TRUE(is_taken(20, 81, 11)) << "less than a quarter";
   EXPECT_FALSE(is_taken(3.1, 8, 11));
   EXPECT_FALSE(is_taken(2.9, 4, 9));
+  EXPECT_FALSE(is_settled_by_dead_time({}, ScoreEvidence{.f = 8})) << "nothing is known of what is left";
 }
 
 TEST(InputDoubt, AnOrderThatWasForcedIsNoDeadTime) {

@@ -12,6 +12,12 @@ class InterruptionMarksTest : public InterruptedTest {
  protected:
   // The run as a station finds it that starts again after a kill: a copy of what is on disk now.
   storage::Run run_after_kill(storage::RunId id) {
+    storage::Database killed{copy_of_store()};
+    storage::RunStore{killed}.interrupt(clock.utc_us());
+    EXPECT_EQ(storage::read_interrupted_parts(killed.handle(), id).size(), 1U) << "by the tools, too";
+    return storage::find_run(killed.handle(), {}, id).value();
+  }
+  std::filesystem::path copy_of_store() {
     EXPECT_TRUE(wait_for(recorder->flush()));
     const std::filesystem::path copy = folder / "killed.sqlite";
     auto vacuum = [copy](storage::Database& database) {
@@ -19,10 +25,7 @@ class InterruptionMarksTest : public InterruptedTest {
       return true;
     };
     wait_for(recorder->on_disk(vacuum));
-    storage::Database killed{copy};
-    storage::RunStore{killed}.interrupt(clock.utc_us());
-    EXPECT_EQ(storage::read_interrupted_parts(killed.handle(), id).size(), 1U) << "by the tools, too";
-    return storage::find_run(killed.handle(), {}, id).value();
+    return copy;
   }
   storage::RunId first_run_of(storage::ExperimentId id) { return view(id).experiment.runs.at(0).run.value(); }
 };
@@ -38,6 +41,17 @@ TEST_F(InterruptionMarksTest, APauseInWhichTheStationIsKilledIsMarked) {
   const storage::InterruptedPart& part = run.interrupted.front();
   EXPECT_EQ(part.reason, "requested");
   EXPECT_NEAR(static_cast<double>(part.to_robot_us - part.from_robot_us) / 1e6, 20, 1);
+}
+
+// Its robot may have been driven after the kill.
+TEST_F(InterruptionMarksTest, AWaitThatAKillEndedMarksNoRunThatIsMadeAfterwards) {
+  const auto id = start(profile({kEightSeconds}));
+  clock.run_for(2s);
+  ASSERT_TRUE(wait_for(experiments->pause(id, {"anna", "", 0})));
+  clock.run_for(5s);
+  storage::Database killed{copy_of_store()};
+  killed.handle().exec("UPDATE run SET state = 'ended', made_afterwards = 1");
+  EXPECT_TRUE(storage::find_run(killed.handle(), {}, first_run_of(id)).value().interrupted.empty());
 }
 
 TEST_F(InterruptionMarksTest, OneThatLastsIsSeenWhileItsRunIsOpen) {
@@ -58,7 +72,7 @@ TEST_F(InterruptionMarksTest, OneThatLastsIsSeenWhileItsRunIsOpen) {
   EXPECT_LT(ended.interrupted.front().to_robot_us, state().latest_robot_time_us - 5'000'000);
 }
 
-TEST_F(InterruptionMarksTest, AKillInTheSecondOfTwoLeavesBoth) {
+TEST_F(InterruptionMarksTest, TheSecondOfTwoIsSeenBesideTheFirst) {
   const auto id = start(profile({kEightSeconds}));
   clock.run_for(2s);
   lose_link(700ms);

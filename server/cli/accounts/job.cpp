@@ -58,11 +58,11 @@ std::string progress_of(const json& job) {
 json wait_for(const JobCommand& options, std::int64_t id) {
   Progress progress{fmt::format("job {}", id), {.is_json = options.json}};
   const std::string again = asks_for_job_again(id, options.data_dir);
-  BusyWait busy{options.busy, again};
+  BusyWait busy{options.busy, fmt::format("job {} goes on without this command; {}", id, again)};
   const StationRequest look{"GET", fmt::format("{}/{}?wait_ms={}", kJobs, id, kLook_ms)};
   for (;;) {
     StationAnswer answer = StationClient{options.data_dir}.ask_at_once({look}, TimeLimit{}.time).front();
-    if (answer.status == 0) throw std::runtime_error{fmt::format("{}; {}", answer.text, again)};
+    if (answer.status == 0) throw std::runtime_error{fmt::format("{}; once it does, {}", answer.text, again)};
     if (busy.asks_again(answer)) continue;
     json job = asked(std::move(answer));
     if (!job.at("ended_at_us").is_null()) return job;

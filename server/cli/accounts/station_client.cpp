@@ -90,8 +90,7 @@ void BusyWait::pause() {
 }
 
 std::string asks_for_job_again(std::int64_t job, const std::filesystem::path& data_dir) {
-  return fmt::format("job {0} goes on without this command; rheonaut job show {0} --wait --data '{1}' waits for it",
-                     job, data_dir.string());
+  return fmt::format("rheonaut job show {} --wait --data '{}' waits for it", job, data_dir.string());
 }
 
 nlohmann::json asked(StationAnswer answer) {

@@ -136,7 +136,8 @@ control::Identification search(const Identify& options, std::span<const analysis
   settings.names = {"--dead-time-s", "--sensor-lag-s", "--offset", "--structure"};
   Progress shown{"identify", options.form};
   settings.on_progress = [&shown](const control::Progress& progress) {
-    shown.set_detail(fmt::format("{}, sse {:.6g}", analysis::in_words(progress), progress.sse));
+    const bool has_begun = progress.starts > 0;
+    shown.set_detail(analysis::in_words(progress) + (has_begun ? fmt::format(", sse {:.6g}", progress.sse) : ""));
     return true;
   };
   return runs.size() == 1 ? analysis::identify_run(runs.front().recorded, settings)

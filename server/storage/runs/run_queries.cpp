@@ -55,11 +55,12 @@ constexpr const char* kInterruptionsOver =
     "SELECT event_row, robot_time_us, value, cause, detail FROM event WHERE boot_key = ?1"
     " AND kind = 'experiment_interrupted' AND robot_time_us < ?3 AND robot_time_us + value * 1e6 >= ?2"
     " ORDER BY robot_time_us";
-// Of a run whose station may have been killed. No index has them, so that they are looked for by their time: within a
-// minute, since a run that is cut off ends with its last sample.
+// Of a run whose station may have been killed: a run that was made afterwards goes on past a kill, and what its robot
+// did then was no waiting. No index has them, so that they are looked for by their time: within a minute, since a run
+// that is cut off ends with its last sample.
 constexpr const char* kInterruptionsBegun =
     "SELECT event_row, robot_time_us, value, cause, detail FROM run JOIN event USING (robot_id)"
-    " WHERE run_id = ?1 AND (state IN ('open', 'interrupted') OR made_afterwards)"
+    " WHERE run_id = ?1 AND state IN ('open', 'interrupted')"
     " AND received_at_us >= started_at_us - 60000000"
     " AND received_at_us <= coalesce(ended_at_us + 60000000, 9223372036854775807)"
     " AND boot_key = ?2 AND kind = 'experiment_paused' ORDER BY event_row";

@@ -347,7 +347,7 @@ TEST_F(AccountsTest, NoExportOfARunHoldsAnyOfIt) {
 }
 
 // SAFETY's test: whatever fails, what moves comes to its end.
-TEST(RightsTest, APartThatFailsKeepsNoOtherOneFromItsEnd) {
+TEST(Rights, APartThatFailsKeepsNoOtherOneFromItsEnd) {
   identity::Rights rights;
   const auto nobody = [] { return std::set<std::string>{}; };
   const auto fails = [](const runtime::EndedRight&) { throw std::runtime_error{"a fault"}; };
