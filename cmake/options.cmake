@@ -15,18 +15,15 @@ target_compile_options(firmware_dialect INTERFACE
 add_compile_options(-ffp-contract=off)
 
 # RHEONAUT_SANITIZE: a list for -fsanitize, empty for none. `enum` is left out because protobuf enumerators are open:
-# a newer peer may send a value that this version does not know. Checks of each pointer take a third of the compiler's
+# a newer peer may send a value that this version does not know; `vptr` because it asks by a pipe whether an object may be
+# read, and so ends a station that has no descriptor left. Checks of each pointer take a third of the compiler's
 # time, so the fuzz preset alone has all of them; elsewhere `alignment` is checked in what also runs on the robot, whose
 # processor has no unaligned access.
-# A room that puts exceptions in words uses `exception_words`: `vptr` asks by a pipe whether an object may be read, and
-# would end a station that has no descriptor left.
-add_library(exception_words INTERFACE)
 set(RHEONAUT_SANITIZE "" CACHE STRING "Sanitizers, as for -fsanitize=")
 if(RHEONAUT_SANITIZE)
   add_compile_options(-fsanitize=${RHEONAUT_SANITIZE} -fno-sanitize-recover=all -fno-omit-frame-pointer)
   if(RHEONAUT_SANITIZE MATCHES "undefined")
-    add_compile_options(-fno-sanitize=enum)
-    target_compile_options(exception_words INTERFACE -fno-sanitize=vptr)
+    add_compile_options(-fno-sanitize=enum,vptr)
     if(NOT RHEONAUT_SANITIZE MATCHES "fuzzer")
       add_compile_options(-fno-sanitize=null,object-size,alignment)
       target_compile_options(firmware_dialect INTERFACE -fsanitize=alignment)
