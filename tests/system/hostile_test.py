@@ -1,6 +1,7 @@
 """Attacks on a real station by a program beside it: a robot is stopped all the while, over open and new connections."""
 import http.client
 import json
+import os
 import re
 import resource
 import socket
@@ -159,6 +160,18 @@ class HostileTest(unittest.TestCase):
         self.expect_stops(3)
         status, _, _ = self.station.request("GET", "/healthz")
         self.assertEqual(status, 200)
+
+    def test_without_any_descriptor(self):
+        """Nothing can be opened, not even by what looks at the database now and then."""
+        station = self.place.station_process.pid
+        opened = len(os.listdir(f"/proc/{station}/fd"))
+        resource.prlimit(station, resource.RLIMIT_NOFILE, (opened, opened))
+
+        def has_failed():
+            self.stop_on_the_open_connection()
+            return "the head of the database is not written" in self.place.log("station")
+        wait_until(has_failed, 60, "the next look at the database")
+        self.stop_on_the_open_connection()
 
     def test_pages_that_never_read(self):
         self.attack("silent_pages")
