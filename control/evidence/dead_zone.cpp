@@ -42,7 +42,7 @@ std::vector<DeadZone> possible_dead_zones(std::span<const FittedRun> runs) {
   return zones;
 }
 
-// What is left of one run without D_i.
+// The rest of one run without D_i.
 struct RunLeft {
   const FittedRun* run = nullptr;
   std::vector<double> sd;  // of each channel's value

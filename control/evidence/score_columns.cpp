@@ -28,8 +28,8 @@ MatrixXd ages(const MatrixXd& slopes, const std::vector<int>& free, Index window
   return all;
 }
 
-// What the duty did not cause: an offset and a drift of each channel, and what a motion before the run leaves, at
-// several lags.
+// Columns of what the duty did not cause: an offset and a drift of each channel, and what a motion before the run
+// leaves, at several lags.
 MatrixXd motions(Index samples, Index channels) {
   std::vector<VectorXd> shapes{VectorXd::Ones(samples), VectorXd::LinSpaced(samples, -1, 1)};
   const Eigen::ArrayXd tick = Eigen::ArrayXd::LinSpaced(samples, 0, static_cast<double>(samples - 1));

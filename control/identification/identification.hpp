@@ -1,4 +1,4 @@
-// What an identification finds: the best model, those that it was compared with, and what is doubtful about it.
+// The result of an identification: the best model, those that it was compared with, and what is doubtful about it.
 #pragma once
 
 #include <optional>

@@ -30,8 +30,8 @@ std::vector<std::string> lag_doubts(const Recording& recording, const Identifica
 // Whether a dead time that nobody named is to be searched for: readings of an acceleration come later than the lag that
 // (2) of sensor_prior.hpp allows, or residuals of another record follow the duty (score_doubts.hpp), for which neither
 // amplitude, a structure that was forced, nor a clock that is fitted is the likelier reason; whether what it found is
-// taken: for an acceleration that asked by its residuals,
-// for other records by AIC and by what it leaves of the evidence of the input; and what is said of it then.
+// taken: for an acceleration by its residuals, for other records by AIC and by what it leaves of the evidence of the
+// input; and what is said of it then.
 bool asks_for_dead_time(const Recording& recording, const IdentificationOptions& options, const Fit& fit,
                         const std::optional<ScoreEvidence>& amplitude, const std::optional<ScoreEvidence>& input);
 struct DeadTimeTrial {

@@ -14,7 +14,8 @@ constexpr float kLeastModelPulsation = 1e-4F;  // (m/s)² s of a window, below w
 
 constexpr float square(float x) { return x * x; }
 
-// Of a signal's square, by a multiple of another one up to `most`: from their product and that one's square.
+// The part of a signal's square that a multiple of another one, up to `most`, explains: from their product and that
+// one's square.
 float explained_part(float product, float square_of_other, float most) {
   if (square_of_other <= 0) return 0;
   const float multiple = std::clamp(product / square_of_other, -most, most);

@@ -14,7 +14,7 @@ namespace robot_fw {
 
 class PulsationWatch {
  public:
-  // What the model's error may be: its gain, relative, and its lag. Zeros: it has none.
+  // The largest error that the model may have: of its gain, relative, and its lag. Zeros: it has none.
   struct Allowed {
     float gain_error = 0, lag_s = 0;
   };

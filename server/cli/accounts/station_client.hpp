@@ -49,7 +49,7 @@ class BusyWait {
   std::int64_t answered_at_us_ = clock_.steady_us();
 };
 
-// Of a wait for a job that did not end by its end.
+// The advice where a wait for a job ends before the job does.
 std::string asks_for_job_again(std::int64_t job, const std::filesystem::path& data_dir);
 
 // By which id the station knows this invocation of a tool: what it begins is kept alive by it alone. Random, unless the

@@ -22,8 +22,8 @@
 
 namespace server::storage {
 
-// Parts of runs in which experiments waited, that are queued beyond the limit of records: some for each robot while the
-// disk fails.
+// Marks of waiting experiments that may be queued, also beyond the limit of records; those within it count, too. Some
+// for each robot while the disk fails.
 inline constexpr std::size_t kMostInterruptions = 1000;
 
 // So many segments have been enqueued, or have left the queue, ever.
